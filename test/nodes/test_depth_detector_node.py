@@ -70,7 +70,7 @@ def test_nothing_is_published_while_no_floor_is_known(rig, output):
     assert diagnostics_of('depth_detector_node')[2]['images without floor'] == 1
 
 
-def test_people_are_detected_and_the_results_have_the_stamp_and_frame_of_the_image(rig, output):
+def test_people_are_detected_with_stamp_and_frame_of_the_image(rig, output):
     with Recorder('yolo_result_out', Image) as images:
         for count in (1, 2):
             sent = rig.send()

@@ -12,6 +12,7 @@ from nav_msgs.msg import OccupancyGrid
 
 from ros_3d_bb.camera.camera_model import transform_points
 from support.driven_robot import DrivenRobot
+from support.planner_definitions import message_class
 from support.processes import end, pid_of
 from support.real_planners import ROOT, planner_environment
 from support.ros import Recorder, header_at, wait_until
@@ -31,11 +32,13 @@ def two_people(seconds):
 
 
 @pytest.fixture(scope='module')
-def robot():
-    """The robot without people around it; the nodes run."""
+def robot(request):
+    """The robot without people around it; the nodes run. The parameter is the local planner, by default dwa."""
     environment = planner_environment()
-    rospy.init_node('test_navigation')
-    nodes = subprocess.Popen(['roslaunch', os.path.join(ROOT, 'test', 'support', 'navigation.launch')], env=environment)
+    if not rospy.core.is_initialized():
+        rospy.init_node('test_navigation')
+    nodes = subprocess.Popen(['roslaunch', os.path.join(ROOT, 'test', 'support', 'navigation.launch'),
+                              'local_planner:=' + getattr(request, 'param', 'dwa')], env=environment)
     driven = DrivenRobot()
     driven.social = Recorder('social_costmap/costmap/costmap', OccupancyGrid, publisher_expected=False)
     driven.goal = rospy.Publisher('move_base_simple/goal', PoseStamped, queue_size=1)
@@ -149,3 +152,20 @@ def test_the_robot_stops_when_a_node_ends_and_drives_on_when_it_is_back(drives, 
     drives.is_faulty = False
     until(drives, lambda: pid_of(node) not in (None, pid), STARTING_S)
     until(drives, lambda: drives.velocity > 0.1, STARTING_S)
+
+
+@pytest.mark.parametrize('robot', ['teb'], indirect=True)
+def test_teb_drives_past_people_who_are_obstacles_and_stops_when_the_camera_stops(drives):
+    obstacles = Recorder('planner_bridge_node/obstacles', message_class('costmap_converter/ObstacleArrayMsg'))
+    person_m, nearest_m = drives.place_m + [4.0, 0.1], 10.0  # in the way
+    drives.people = lambda _seconds: person_m[None]
+
+    def has_passed():
+        nonlocal nearest_m
+        nearest_m = min(nearest_m, float(np.linalg.norm(person_m - drives.place_m)))
+        return drives.place_m[0] > person_m[0] + 0.5
+
+    until(drives, has_passed, 20.0)
+    assert any(len(message.obstacles) == 1 for message in obstacles.messages) and 0.5 < nearest_m < 1.5
+    drives.sees = False
+    assert until(drives, lambda: drives.velocity < STANDING_MPS, 5.0) <= STOP_S

@@ -139,7 +139,7 @@ def test_without_images_nothing_is_stored(rig, folder):
     assert not capture().success and entries(folder) == ()
 
 
-def test_captures_are_appended_and_read_back_and_the_same_image_is_not_stored_twice(rig, folder):
+def test_captures_are_appended_and_an_image_is_stored_once(rig, folder):
     first = rig.send()
     assert 'with 2 3D boxes, label A1: number 1 in ' + folder in captured(folder)
     rospy.set_param('viewer_node/label', 'B2')
@@ -226,7 +226,8 @@ def test_keys_store_pause_and_quit(rig, window):
     for presses in (1, 2, 3):
         press_key('p')
         wait_until(lambda: len(calls) == presses, 'the call of the detector')
-    press_key('q')
+    # It can close before press returns.
+    wait_until(lambda: press(TITLE, 'q') or process.poll() is not None, 'the window')
     assert process.wait(timeout=20) == 0
     assert calls == [False, True, False, True]  # the detector is resumed at the end
     service.shutdown()

@@ -24,43 +24,6 @@ def yaw_of(quaternion):
     return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
-def moved(points, transform):
-    """Points (n, 3) by a 4x4 matrix."""
-    return np.reshape(points, (-1, 3)).dot(transform[:3, :3].T) + transform[:3, 3]
-
-
-class TebReplica(object):
-    """teb_local_planner (Noetic): teb_local_planner_ros.cpp and obstacles.h.
-
-    It keeps the last array and ignores its stamp. Positions are transformed by the latest transform from the array's
-    frame (the identity where there is none); velocities are not. An obstacle of less than 1 mm/s is static; another one
-    moves on from its position at the moment of planning.
-    """
-
-    def __init__(self, planner_from):
-        self._planner_from = planner_from
-
-    def receive(self, array):
-        self._array = array
-
-    def obstacles(self):
-        """(centre (2,), radius, velocity (2,) or None) of each circle."""
-        transform = self._planner_from.get(self._array.header.frame_id, np.eye(4))
-        found = []
-        for obstacle in self._array.obstacles:
-            assert len(obstacle.polygon.points) == 1 and obstacle.radius > 0  # otherwise it is not a circle to TEB
-            point = obstacle.polygon.points[0]
-            velocity = np.array([obstacle.velocities.twist.linear.x, obstacle.velocities.twist.linear.y])
-            found.append((moved([point.x, point.y, point.z], transform)[0, :2], obstacle.radius,
-                          velocity if np.linalg.norm(velocity) >= 0.001 else None))
-        return found
-
-    def predicted(self, ahead_s):
-        """Expected centres of the circles, seconds after planning, (n, 2)."""
-        return np.array([centre + ahead_s * (0 if velocity is None else velocity)
-                         for centre, _radius, velocity in self.obstacles()]).reshape(-1, 2)
-
-
 class JackalMpcReplica(object):
     """mpc_planner_jackal (tud-amr/mpc_planner): ros1_jackal.cpp, obstacleCallback.
 

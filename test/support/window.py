@@ -11,7 +11,27 @@ from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets  # noqa: E402
 QtTest = importlib.import_module(QtCore.__name__.replace('QtCore', 'QtTest'))  # of the binding that is in use
 CONTROL, SHIFT, ALT = Qt.ControlModifier, Qt.ShiftModifier, Qt.AltModifier
 TRIES, WAIT_MS = 1000, 20
+FORGOTTEN_MS = 10000
 APPLICATION = make_application()  # Qt ends with the last reference to it
+
+
+class ForgottenDialogs(QtCore.QTimer):
+    """Closes a dialog that is open at two successive ticks: without an answer, the test would wait forever."""
+
+    def __init__(self):
+        super(ForgottenDialogs, self).__init__()
+        self._open = None
+        self.timeout.connect(self._close)
+        self.start(FORGOTTEN_MS)
+
+    def _close(self):
+        before, self._open = self._open, QtWidgets.QApplication.activeModalWidget()
+        if before is not None and before is self._open and not isinstance(before, QtWidgets.QProgressDialog):
+            before.close()
+            self._open = None
+
+
+FORGOTTEN_DIALOGS = ForgottenDialogs()
 
 
 class Driver(object):

@@ -57,7 +57,7 @@ def test_crowds_have_the_same_costs(seed):
 
 
 @given(SEEDS)
-def test_each_track_and_each_measurement_is_matched_at_most_once_and_within_its_group(seed):
+def test_tracks_and_measurements_are_matched_once_within_a_group(seed):
     tracks, measurements, params, outliers = scene(seed)
     matches = associate(tracks, measurements, 0, params, outliers)
     for members in zip(*matches):

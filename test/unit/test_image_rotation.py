@@ -39,7 +39,7 @@ def test_points_are_projected_onto_the_same_pixels_of_the_turned_image(turns, mo
 
 @pytest.mark.parametrize('turns', TURNS)
 @pytest.mark.parametrize('tilt_rad', [-0.5, 0.0, 0.9])
-def test_the_pose_of_a_mounted_camera_gives_its_turns_and_a_positive_tilt_looks_down(turns, tilt_rad):
+def test_turns_of_a_mounted_camera_and_a_positive_tilt_looks_down(turns, tilt_rad):
     pose = mounted_camera(1.2, tilt_rad, turns)
     up = pose[2, :3]
     assert quarter_turns(up) == turns_for('auto', up) == turns

@@ -78,7 +78,7 @@ def test_the_mixture_has_the_mean_and_the_covariance_of_both_updates(seed):
     np.testing.assert_allclose(covariance_of(after), np.average(spreads, axis=0, weights=shares), rtol=1e-6, atol=1e-8)
 
 
-def test_a_measurement_behind_the_person_is_an_outlier_and_one_beside_is_not():
+def test_a_measurement_behind_the_person_is_an_outlier():
     """0.8 m behind is what a background pixel looks like; 0.8 m beside no background explains."""
     sure = state(spread=0.1)
     behind, beside = update(sure, measured_at(0.8, 0.0), OUTLIERS), update(sure, measured_at(0.0, 0.8), OUTLIERS)

@@ -1,10 +1,16 @@
-"""Benchmark of navigation: its scenes, the pace of the simulated time, the map, and the summary of trials."""
+"""Benchmark of navigation: its scenes and sensors, the pace of the simulated time, the map, and the summary of trials.
+"""
+from collections import namedtuple
+
 import numpy as np
 import pytest
 
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
+from ros_3d_bb_lab.evaluation.navigation.ideal_sensors import VisiblePeople, scan_angles, scan_ranges
 from ros_3d_bb_lab.evaluation.navigation.navigation_scenes import DURATION_S, SCENES, scenario_of
 from ros_3d_bb_lab.evaluation.navigation.trial_result import CELL_M, Pace, occupancy, summary
+from ros_3d_bb_lab.simulation.collision import Rectangle
 from ros_3d_bb_lab.simulation.scenario import Furniture, Room, scenario_from
 
 LEAD_NS = int(Pace.LEAD_S * NS)
@@ -55,3 +61,23 @@ def test_the_summary_of_trials():
     assert summary(trials) == {'runs': 2, 'collisions': 2, 'collisions_driving': 1, 'runs_with_collisions': 1,
                                'reached': 1, 'time_to_goal_s': 10.0, 'min_distance_m': -.1, 'stops': 1.5}
     assert summary(trials[1:])['time_to_goal_s'] is None
+
+
+def test_people_are_visible_in_the_newest_image_of_any_camera():
+    Track = namedtuple('Track', 'id status')
+    visible = VisiblePeople(cameras=2)
+    images = (VISIBLE, OUT_OF_VIEW), (OUT_OF_VIEW, VISIBLE), (OCCLUDED, VISIBLE), (VISIBLE, OCCLUDED)
+    shown = [[track.id for track in visible.of([Track(1, one), Track(2, other)])] for one, other in images]
+    assert shown == [[1], [1, 2], [2], [1, 2]]
+
+
+def test_the_laser_measures_to_people_and_boxes_and_what_is_near_hides_what_is_behind():
+    ranges = scan_ranges((1.0, 2.0), np.pi / 2, [(1.0, 5.0), (1.0, 7.0), (1.0, -1.0), (1.0, 14.0)],
+                         [Rectangle((-2.0, 2.0), 0.0, (1.0, 4.0))])
+
+    def towards(degrees):
+        return ranges[np.argmin(np.abs(scan_angles() - np.radians(degrees)))]
+
+    assert towards(0) == pytest.approx(3.0 - 0.15)
+    assert towards(90) == pytest.approx(2.5)
+    assert towards(-90) == np.inf and np.isfinite(ranges).sum() < 200

@@ -72,7 +72,7 @@ def test_what_is_visible_is_in_the_image_and_what_is_out_of_view_is_not(height, 
     assert result != OUT_OF_VIEW or narrower < 0.6
 
 
-def test_people_on_opposite_sides_of_a_camera_pointing_down_do_not_occlude_each_other():
+def test_no_occlusion_between_opposite_sides_of_a_downward_camera():
     view = CameraView(mounted(3, 90), CAMERA)
     assert place(0.02, 0.9, view, others=[(-0.02, 0.4)]) == OCCLUDED
     assert place(0.02, 0.9, view, others=[(-0.02, -0.4)]) == VISIBLE

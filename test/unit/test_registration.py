@@ -27,7 +27,7 @@ def registered(depth_m, color, shift_m, depth_camera=WIDE, rotation=(0, 0, 0, 1)
 
 
 @pytest.mark.parametrize('zoom', [0.5, 1.0, 1.7, 3.0])
-def test_the_size_of_a_point_leaves_no_gaps_and_what_is_near_hides_what_is_behind(zoom):
+def test_registered_points_leave_no_gaps_and_hide_what_is_behind(zoom):
     """The stripe moves by its disparity; beside it, the depth camera sees no wall."""
     color = Camera(int(160 * zoom), int(120 * zoom), 80 * zoom, 80 * zoom, 79.5 * zoom, 59.5 * zoom)
     depth_m = registered(stripe(), color, 0.2).values

@@ -120,7 +120,7 @@ def test_a_missed_person_is_occluded_until_unpublished():
     assert walk[29][0].status == VISIBLE and walk[33][0].status == OCCLUDED
 
 
-def test_a_person_who_leaves_the_view_is_published_while_the_position_is_certain():
+def test_a_person_out_of_view_is_published_while_certain():
     """Walks out to the left at 1 m/s, which a robot must know that drives across the way."""
     walk = play(Tracker(), 5, lambda time_s: [at(3, time_s)] if time_s < 1.75 else [])
     left = [objects[0] for objects in walk[53:] if objects]
@@ -129,7 +129,7 @@ def test_a_person_who_leaves_the_view_is_published_while_the_position_is_certain
     assert left[-1].position_m[1] == pytest.approx(1.75 + len(left) / 30.0, abs=0.3)
 
 
-def test_a_standing_person_out_of_view_stays_published_while_the_position_is_certain():
+def test_a_standing_person_out_of_view_is_published_while_certain():
     """The camera turns away: until the standard deviation of the position is 0.5 m."""
     tracker, away = Tracker(), VIEW._replace(fixed_from_camera=transform_from((0, 0, 0), (0, 0, 1, 0)).dot(
         VIEW.fixed_from_camera))
@@ -225,7 +225,7 @@ def test_a_track_continues_with_truncated_boxes():
     np.testing.assert_allclose((track.position_m[2], track.size_m[2]), (0.875, 1.75), atol=0.03)
 
 
-def test_a_track_started_by_a_truncated_box_gets_the_height_of_the_first_whole_one():
+def test_height_of_a_truncated_track_follows_the_first_whole_box():
     """After half a second, in which the ends may be truncated again."""
     def walk(time_s):
         return [cut_by(['top', 'bottom'], 0.56, bottom=0.3) if time_s < 2 else at(2, 0, height=1.8)]
@@ -260,7 +260,7 @@ def test_size_is_smoothed():
     assert np.std(heights_m) < 0.025 and np.mean(heights_m) == pytest.approx(1.7, abs=0.03)
 
 
-def test_published_tracks_keep_their_ids_when_a_late_image_shows_another_person():
+def test_published_tracks_keep_ids_when_a_late_image_adds_a_person():
     tracker = Tracker()
     play(tracker, 1, standing((3, 0)))
     play(tracker, 0.3, standing((3, 0), (4, 1.2)), start_s=1.1)

@@ -68,7 +68,7 @@ def ends_of_sliders():
 
 @pytest.mark.parametrize('changed_at', [0, 20])
 @pytest.mark.parametrize('make,kinds,given_params', ends_of_sliders())
-def test_a_person_who_is_always_detected_has_one_id_at_the_ends_of_all_sliders(make, kinds, given_params, changed_at):
+def test_a_detected_person_keeps_one_id_at_the_ends_of_all_sliders(make, kinds, given_params, changed_at):
     """The person walks in a slight curve. The parameter is changed before the first image, or after 2 s."""
     random, tracker, published = np.random.RandomState(0), make(), []
     view = CameraView(mounted(1.0), CAMERA)

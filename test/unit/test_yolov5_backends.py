@@ -39,9 +39,21 @@ def assert_same_predictions(runtime, network, image):
     np.testing.assert_allclose(runtime(image, -1), expected, atol=1e-3, rtol=1e-4)
 
 
+class ExportableSiLU(torch.nn.Module):
+    """SiLU in operators that each version of torch exports."""
+
+    def forward(self, x):
+        return x * torch.sigmoid(x)
+
+
 def exported_onnx(path, network, hw, metadata, dynamic=False):
-    """Write a network as YOLOv5's export does: one output, stride and names in the metadata."""
+    """Write a network as YOLOv5's export does: one output, stride and names in the metadata, SiLU as Sigmoid and Mul,
+    which torch 1.7 cannot export otherwise.
+    """
     import onnx
+    for module in network.modules():
+        if isinstance(getattr(module, 'act', None), torch.nn.SiLU):
+            module.act = ExportableSiLU()
     axes = {'images': {2: 'height', 3: 'width'}, 'output0': {1: 'rows'}} if dynamic else None
     torch.onnx.export(network, torch.zeros((1, 3) + hw), path, opset_version=12, input_names=['images'],
                       output_names=['output0'], dynamic_axes=axes, **supported(torch.onnx.export, dynamo=False))

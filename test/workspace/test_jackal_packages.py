@@ -115,7 +115,7 @@ def footprint_of(parameters):
     return corners[0] + parameters['/move_base/local_costmap/footprint_padding']
 
 
-def test_the_footprint_contains_chassis_wheels_and_fenders_but_not_the_bumper(packages, content, jackal):
+def test_footprint_contains_chassis_wheels_and_fenders_only(packages, content, jackal):
     half = footprint_of(loaded('navigation.launch')[0])
     chassis = np.abs(content('jackal_navigation/params/costmap_common_params.yaml')['footprint'])
     size = properties(packages)

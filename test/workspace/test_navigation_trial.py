@@ -1,4 +1,5 @@
 """The benchmark of navigation: what each mode starts, and one trial under roslaunch."""
+import argparse
 import json
 import os
 import subprocess
@@ -12,6 +13,7 @@ from support.processes import processes_naming
 from support.real_planners import planner_environment
 
 ARGUMENTS = ['scenario:=/some/scene.yaml', 'record:=/some/record.json']
+OPTIONS = argparse.Namespace(planner='dwa', detector='exact', rate=10.0)
 PIPELINE = {'ours': {'bbox3d_node', 'tracker_node'}, 'thesis': {'people_node'}}
 
 
@@ -25,12 +27,25 @@ def test_modes_differ_in_what_move_base_knows_of_people(mode):
     assert (['ground_truth', 'ros_3d_bb/tracks'] in nodes['simulator_node'].remap_args) == (mode == 'truth')
     layers = [layer['name'] for layer in parameters['/move_base/local_costmap/plugins']]
     assert layers == ['static_layer'] + {
-        'depth': ['obstacle_layer', 'inflation_layer'], 'none': ['inflation_layer']}.get(
-            mode, ['people_layer', 'prediction_layer'])
-    assert parameters['/move_base/DWAPlannerROS/sum_scores'] == (mode not in ('depth', 'none'))
-    waits_for = [name for name in ('tracks', 'cloud') if parameters['/navigation_trial_node/' + name]]
-    assert waits_for == {'depth': ['cloud'], 'none': []}.get(mode, ['tracks'])
+        'depth': ['obstacle_layer', 'inflation_layer'], 'laser': ['obstacle_layer', 'inflation_layer'],
+        'none': ['inflation_layer']}.get(mode, ['people_layer', 'prediction_layer'])
+    assert parameters['/move_base/DWAPlannerROS/sum_scores'] == (mode not in ('depth', 'laser', 'none'))
+    waits_for = [name for name in ('tracks', 'cloud', 'scan') if parameters['/navigation_trial_node/' + name]]
+    assert waits_for == {'depth': ['cloud'], 'laser': ['scan'], 'none': []}.get(mode, ['tracks'])
+    assert parameters['/navigation_trial_node/visible'] == (mode == 'visible')
     assert parameters['/simulator_node/drive'] and parameters['/simulator_node/supervised']
+
+
+@pytest.mark.parametrize('detector, node', [('depth', 'depth_detector_node'), ('yolov5', 'yolov5_node')])
+def test_a_detector_replaces_the_true_boxes(detector, node):
+    parameters, nodes = loaded('navigation_benchmark.launch', 'detector:=' + detector, 'weights:=/some/file.onnx',
+                               *ARGUMENTS)
+    assert not parameters['/simulator_node/boxes'] and nodes[node].type == node
+
+
+def test_a_trial_runs_with_teb():
+    parameters, _nodes = loaded('navigation_benchmark.launch', 'local_planner:=teb', *ARGUMENTS)
+    assert parameters['/move_base/base_local_planner'] == 'teb_local_planner/TebLocalPlannerROS'
 
 
 def test_a_recorded_trial_is_not_repeated(tmp_path, monkeypatch):
@@ -38,11 +53,11 @@ def test_a_recorded_trial_is_not_repeated(tmp_path, monkeypatch):
     monkeypatch.setattr('ros_3d_bb_lab.evaluation.navigation.benchmark.launch',
                         lambda *arguments: started.append(arguments))
     (tmp_path / 'standing-ours-3.json').write_text('{"collisions": 0}')
-    assert run_trial(('standing', 'ours', 3, str(tmp_path))) == {
+    assert run_trial(('standing', 'ours', 3, str(tmp_path), OPTIONS)) == {
         'scene': 'standing', 'mode': 'ours', 'seed': 3, 'collisions': 0}
     assert not started
     with pytest.raises(RuntimeError, match='standing, ours, seed 4: no result'):
-        run_trial(('standing', 'ours', 4, str(tmp_path)))
+        run_trial(('standing', 'ours', 4, str(tmp_path), OPTIONS))
     assert len(started) == 1
 
 

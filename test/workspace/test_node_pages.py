@@ -25,7 +25,7 @@ SCENARIO = os.path.join(ROOT, 'config', 'scenarios', 'empty_room.yaml')
 # Parameters with which nodes connect to all their topics; the other nodes are created as by the fuzzer.
 MORE_PARAMS = {'planner_bridge_node': {'outputs': 'costmap, people, teb, mpc, vision'},
                'realsense_node': {'publish_clock': True}, 'replay_node': {'boxes': True},
-               'navigation_trial_node': {'scenario': SCENARIO, 'tracks': True, 'cloud': True},
+               'navigation_trial_node': dict(scenario=SCENARIO, tracks=True, cloud=True, visible=True, scan=True),
                'simulator_node': {'scenario': SCENARIO, 'publish_clock': True, 'drive': True, 'boxes': True,
                                   'supervised': True}}
 OTHERS = {'realsense_node': RealSenseNode, 'replay_node': ReplayNode, 'simulator_node': SimulatorNode,

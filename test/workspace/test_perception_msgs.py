@@ -255,7 +255,7 @@ def test_a_truncated_person_in_portrait_has_the_usual_width(edge, y_m):
     np.testing.assert_allclose(abs(detection.position_m[1]), 0.27)
 
 
-def test_a_camera_that_points_straight_down_keeps_one_orientation_in_spite_of_noise():
+def test_box_orientation_is_stable_for_a_camera_pointing_down():
     random = np.random.RandomState(0)
     for _ in range(100):
         roll_deg, pitch_deg, yaw_deg = (0, 90, 0) + random.normal(0, 0.5, 3)

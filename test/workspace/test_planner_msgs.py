@@ -22,7 +22,7 @@ from ros_3d_bb.planning.planner_view import footprint_points, in_frame, predicte
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
 from support.masterless import on_the_wire
 from support.planner_definitions import PUBLISHED_MD5, message_class, package
-from support.planners import JackalMpcReplica, TebReplica
+from support.planners import JackalMpcReplica
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 QUARTER = transform_from((10, 5, 0), (0, 0, np.sqrt(0.5), np.sqrt(0.5)))  # odom_from_map: a quarter turn to the left
@@ -55,24 +55,15 @@ def obstacles(tracks, frame_id='map'):
     return sent(obstacles_to_msg, 'costmap_converter', tracks, frame_id)
 
 
-def test_teb_does_not_turn_velocities_so_they_are_sent_in_its_own_frame():
-    teb = TebReplica({'map': QUARTER})
-    tracks = [walker(3, [1, 2, 0.9], [1.2, 0, 0])]
-    turned = in_frame(tracks, QUARTER)
-    for sent_tracks, frame_id, expected_mps in ((turned, 'odom', [0, 1.2]), (tracks, 'map', [1.2, 0])):
-        teb.receive(obstacles(sent_tracks, frame_id))
-        (centre, radius, velocity), = teb.obstacles()
-        np.testing.assert_allclose(centre, [8, 6], atol=1e-6)
-        np.testing.assert_allclose(velocity, expected_mps, atol=1e-9)
-        assert radius == pytest.approx(0.3)
-
-
-def test_teb_plans_from_now_so_positions_are_predicted_to_now():
-    """The image is 0.3 s old; TEB plans 1 s ahead, so the person is 1.3 s further on."""
-    teb, tracks = TebReplica({}), [walker(3, [1, 2, 0.9], [1.2, 0, 0]), walker(4, [5, 5, 0.9], [0, 0, 0])]
-    teb.receive(obstacles(predicted_to(tracks, 0.3)))
-    np.testing.assert_allclose(teb.predicted(1.0), [[1 + 1.3 * 1.2, 2], [5, 5]], atol=1e-6)
-    assert [velocity is None for _centre, _radius, velocity in teb.obstacles()] == [False, True]
+def test_obstacles_are_circles_where_people_are_now_with_velocities_in_the_frame_of_the_planner():
+    """TEB takes positions as of now, and transforms them into its frame, but not velocities. The image is 0.3 s old."""
+    tracks = predicted_to([walker(3, [1, 2, 0.9], [1.2, 0, 0]), walker(4, [5, 5, 0.9], [0, 0, 0])], 0.3)
+    walking, standing = obstacles(in_frame(tracks, QUARTER), 'odom').obstacles
+    for obstacle, position_m, velocity_mps in ((walking, [8, 6.36], [0, 1.2]), (standing, [5, 10], [0, 0])):
+        (point,), twist = obstacle.polygon.points, obstacle.velocities.twist  # one point: a circle to TEB
+        np.testing.assert_allclose([point.x, point.y], position_m, atol=1e-6)
+        np.testing.assert_allclose([twist.linear.x, twist.linear.y], velocity_mps, atol=1e-9)
+        assert obstacle.radius == pytest.approx(0.3)
 
 
 def test_obstacles_have_id_and_velocity_covariance_and_float32_points():

@@ -164,7 +164,7 @@ def recordings_of_another_robot(folder):
     return [(rewritten(folder + '/scene.bag', folder + '/older.bag', older), {}, 'none', 2.83 - 0.09)]
 
 
-def test_images_that_are_far_apart_need_the_tolerance_that_the_message_names(tmp_path, weights):
+def test_images_far_apart_need_the_tolerance_named_by_the_message(tmp_path, weights):
     for path, topics, detector, surface_m in recordings_of_another_robot(str(tmp_path)):
         settings = Settings(detector=detector, names=topics)
         settings = with_params(settings, 'yolov5', weights=weights)

@@ -84,7 +84,7 @@ def settings(depth='raw', detector='none'):
     return made
 
 
-def test_boxes_from_raw_depth_have_the_position_of_those_from_aligned_depth(bag, tmp_path):
+def test_boxes_from_raw_depth_equal_those_from_aligned_depth(bag, tmp_path):
     plain = process_bag(bag, str(tmp_path / 'plain.bag'), settings('aligned'))
     with pytest.raises(SystemExit) as ended:
         main([bag, str(tmp_path / 'raw.bag'), '--detector', 'none', '--depth', 'raw'])

@@ -39,7 +39,7 @@ def test_time_jumps_back_twice(rig):
         assert rig.send(START_NS + 5 * NS + PERIOD_NS, camera) is not None
 
 
-def test_an_image_that_awaits_its_transform_while_time_jumps_back_is_dropped(rig):
+def test_image_awaiting_its_transform_is_dropped_when_time_goes_back(rig):
     """The front camera's first image of the new time comes in the rear camera's wait; the rear camera ends there."""
     for number in range(200):
         rig.send(START_NS + number * PERIOD_NS, 'front')

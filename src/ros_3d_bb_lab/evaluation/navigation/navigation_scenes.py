@@ -13,7 +13,7 @@ BOUNDS_M = [-4.0, 13.0, -4.0, 4.0]
 MEETING_X_M = 4.0
 REACHED_AFTER_S = 5.5  # the undisturbed robot needs this time to MEETING_X_M
 DOOR_M = 1.6  # width of the door
-RATE_HZ = 10.0  # images of each camera
+RATE_HZ = 10.0  # images of each camera, by default
 CAMERAS = [{'name': name, 'mount': [0.17, side * 0.05, 0.20], 'yaw': side * 0.85}
            for name, side in (('left', 1), ('front', 0), ('right', -1))]
 
@@ -76,11 +76,11 @@ SCENES = {scene.__name__: scene for scene in (standing, head_on, crossing_left, 
                                               crowd, pillar)}
 
 
-def scenario_of(name, seed, cameras=CAMERAS):
+def scenario_of(name, seed, rate_hz=RATE_HZ, cameras=CAMERAS):
     """Content of the scenario file of a scene; without `cameras` the robot has one, which looks ahead."""
     random = np.random.RandomState([seed, sorted(SCENES).index(name)])
     people, furniture = SCENES[name](random)
-    return {'duration': DURATION_S, 'rate': RATE_HZ, 'seed': seed, 'people': people,
+    return {'duration': DURATION_S, 'rate': rate_hz, 'seed': seed, 'people': people,
             'robot': {'pose': [0.0, 0.0, 0.0], 'cameras': list(cameras)},
             'room': {'bounds': BOUNDS_M, 'height': 2.8, 'furniture': furniture}}
 

@@ -5,10 +5,11 @@ import threading
 import time
 from typing import NamedTuple
 
+import numpy as np
 import rospy
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Twist
 from nav_msgs.msg import MapMetaData, OccupancyGrid, Odometry
-from sensor_msgs.msg import CameraInfo, Image, PointCloud2
+from sensor_msgs.msg import CameraInfo, Image, LaserScan, PointCloud2
 from std_msgs.msg import Float32, Header, Time, UInt32
 from tf2_msgs.msg import TFMessage
 
@@ -20,11 +21,14 @@ from ros_3d_bb.core.params import SET_BY_LAUNCH, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb_lab.evaluation.navigation.ideal_sensors import (SCAN_ANGLE_RAD, SCAN_BEAMS, SCAN_RANGE_M, VisiblePeople,
+                                                               scan_ranges)
 from ros_3d_bb_lab.evaluation.navigation.trial_result import (CELL_M, Pace, distance_m, occupancy,
                                                               points_of, stops, was_driving)
+from ros_3d_bb_lab.simulation.collision import Rectangle
+from ros_3d_bb_lab.simulation.ros.scenario_to_bag import BASE_FRAME, MAP_FRAME, ODOM_FRAME, TRUTH_TOPIC
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 
-MAP_FRAME = 'map'
 REACHED_M = 0.4  # the goal tolerance of move_base is 0.3 m
 POLL_S = 0.002
 START_TIMEOUT_S, TRIAL_TIMEOUT_S = 180.0, 600.0  # of the machine's time
@@ -41,6 +45,8 @@ class NavigationTrialParams(NamedTuple):
     goal_y: float = Param(0.0, limits=(-1000, 1000))
     tracks: bool = Param(False, 'Whether the time waits for tracks.', section=SET_BY_LAUNCH)
     cloud: bool = Param(False, 'Whether the points of the depth images are published.', section=SET_BY_LAUNCH)
+    visible: bool = Param(False, 'Whether the true tracks of visible people are published.', section=SET_BY_LAUNCH)
+    scan: bool = Param(False, 'Whether the scan of a planar laser is published.', section=SET_BY_LAUNCH)
     timeout: float = Param(30.0)
 
 
@@ -69,6 +75,8 @@ class NavigationTrialNode(object):
         Depth images of each camera of the scenario; only with ~cloud.
     camera/aligned_depth_to_color/camera_info : sensor_msgs/CameraInfo
         Their intrinsics; only with ~cloud.
+    ground_truth : ros_3d_bb/TrackedObjectArray
+        True people, from the simulator; only with ~visible or ~scan.
     move_base/local_costmap/costmap : nav_msgs/OccupancyGrid
         Shows that move_base has started.
 
@@ -80,6 +88,10 @@ class NavigationTrialNode(object):
         Goal in the map.
     camera/points : sensor_msgs/PointCloud2
         Points of the depth images of each camera; only with ~cloud.
+    ros_3d_bb/tracks : ros_3d_bb/TrackedObjectArray
+        True tracks of the people whom a camera shows; only with ~visible.
+    scan : sensor_msgs/LaserScan
+        Scan of an ideal laser at the centre of the robot; only with ~scan.
     simulator_node/time_limit : std_msgs/Time
         Time that the simulator does not exceed.
     """
@@ -88,7 +100,7 @@ class NavigationTrialNode(object):
         self._params, = read_params(NavigationTrialParams)
         self._scenario = read_scenario(self._params.scenario)
         self._pace, self._costmap_seen, self._cameras = Pace(), False, {}
-        self._position, self._speeds_mps, self._clearances_m = None, [], []
+        self._position, self._yaw, self._speeds_mps, self._clearances_m = None, 0.0, [], []
         self._collisions, self._driving_collisions = 0, 0
         self._map_pub = rospy.Publisher('map', OccupancyGrid, queue_size=1, latch=True)
         self._goal_pub = rospy.Publisher('move_base_simple/goal', PoseStamped, queue_size=1)
@@ -102,6 +114,14 @@ class NavigationTrialNode(object):
         if self._params.tracks:
             rospy.Subscriber(TRACKS_TOPIC, TrackedObjectArray,
                              lambda message: self._pace.heard('tracks', message.header.stamp.to_nsec()))
+        if self._params.visible:
+            self._visible = VisiblePeople(len(self._scenario.robot.mounts))
+            self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=10)
+            rospy.Subscriber(TRUTH_TOPIC, TrackedObjectArray, self._publish_visible)
+        if self._params.scan:
+            self._furniture = [Rectangle(item.at, item.yaw, item.size[:2]) for item in self._scenario.room.furniture]
+            self._scan_pub = rospy.Publisher('scan', LaserScan, queue_size=10)
+            rospy.Subscriber(TRUTH_TOPIC, TrackedObjectArray, self._publish_scan)
         if self._params.cloud:
             for mount in self._scenario.robot.mounts:
                 self._convert_depth_of(mount.name)
@@ -126,10 +146,10 @@ class NavigationTrialNode(object):
             rospy.logfatal('move_base, tracker or camera did not start within %.0f s; there is no result',
                            START_TIMEOUT_S)
             return
-        start_ns = self._now_ns()
+        start_ns, sources = self._now_ns(), self._sources()
         self._speeds_mps, self._clearances_m = [], []
         self._goal_pub.publish(goal_message(self._params, time_from(start_ns)))
-        self._pace.start(start_ns, ['commands'] + ['tracks'] * self._params.tracks + ['cloud'] * self._params.cloud)
+        self._pace.start(start_ns, ['commands'] + sources)
         time_to_goal_s = self._drive(start_ns)
         if rospy.is_shutdown():
             return  # interrupted: there is no result
@@ -139,10 +159,14 @@ class NavigationTrialNode(object):
         with open(self._params.record, 'w') as stream:
             json.dump(result, stream)
 
+    def _sources(self):
+        """Names of the inputs of move_base for which the time waits."""
+        return [name for name in ('tracks', 'cloud', 'scan') if getattr(self._params, name)]
+
     def _started(self):
         """Wait until everything runs. Returns whether it does."""
         deadline_s, ready_ns = time.monotonic() + START_TIMEOUT_S, None
-        wanted = set(['tracks'] * self._params.tracks + ['cloud'] * self._params.cloud)
+        wanted = set(self._sources())
         while time.monotonic() < deadline_s and not rospy.is_shutdown():
             is_ready = (self._costmap_seen and self._position is not None and wanted <= self._pace.sources
                         and self._goal_pub.get_num_connections() and self._limit_pub.get_num_connections())
@@ -172,8 +196,9 @@ class NavigationTrialNode(object):
 
     def _on_tf(self, message):
         links = {link.child_frame_id: transform_from_msg(link) for link in message.transforms}
-        if 'odom' in links and 'base_link' in links:
-            self._position = tuple(links['odom'].dot(links['base_link'])[:2, 3])
+        if ODOM_FRAME in links and BASE_FRAME in links:
+            map_from_base = links[ODOM_FRAME].dot(links[BASE_FRAME])
+            self._position, self._yaw = map_from_base[:2, 3], np.arctan2(map_from_base[1, 0], map_from_base[0, 0])
 
     def _on_collisions(self, message):
         if message.data > self._collisions:
@@ -188,6 +213,21 @@ class NavigationTrialNode(object):
             points_m = points_of(imgmsg_to_depth(message), self._cameras[camera])
             cloud_pub.publish(points_to_msg(points_m, message.header))
             self._pace.heard('cloud', message.header.stamp.to_nsec())
+
+    def _publish_visible(self, message):
+        message.objects = self._visible.of(message.objects)
+        self._tracks_pub.publish(message)
+
+    def _publish_scan(self, message):
+        """The robot moves less than a beam between the image and the newest transform."""
+        if self._position is None:
+            return
+        people = [(track.pose.pose.position.x, track.pose.pose.position.y) for track in message.objects]
+        self._scan_pub.publish(LaserScan(
+            header=Header(stamp=message.header.stamp, frame_id=BASE_FRAME), angle_min=-SCAN_ANGLE_RAD / 2,
+            angle_max=SCAN_ANGLE_RAD / 2, angle_increment=SCAN_ANGLE_RAD / (SCAN_BEAMS - 1), range_max=SCAN_RANGE_M,
+            ranges=scan_ranges(self._position, self._yaw, people, self._furniture)))
+        self._pace.heard('scan', message.header.stamp.to_nsec())
 
 
 def map_message(room):
