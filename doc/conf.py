@@ -1,4 +1,4 @@
-"""Sphinx: the README, doc/ and config/ as a site. `./run doc` builds it; nothing is fetched from a network.
+"""Sphinx: README, doc/, config/ and changelog as a site. `./run doc` builds it; nothing is fetched from a network.
 
 The root of the repository is the folder of the sources, so that Sphinx checks every link between pages, and to files.
 """
@@ -13,33 +13,45 @@ LINK = re.compile(r'\[([^\]]*)\]\(([^)\s#]+)\)')
 
 project = 'ros_3d_bb'
 author = 'ros_3d_bb developers'
-root_doc = 'doc/index'
-source_suffix = {'.md': 'markdown'}
-include_patterns = ['README.md', 'CONTRIBUTING.md', 'doc/**', 'config/**']
+with open(os.path.join(ROOT, 'package.xml'), encoding='utf-8') as _stream:
+    version = re.search('<version>(.*)</version>', _stream.read()).group(1)
+root_doc, CONTENTS = 'README', 'doc/index'
+source_suffix = {'.md': 'markdown', '.rst': 'restructuredtext'}
+include_patterns = ['*.md', 'CHANGELOG.rst', '.github/SUPPORT.md', 'doc/**', 'config/**']
+# Other spellings and words for the search.
+KEYWORDS = {'doc/licences': 'license licensing', 'doc/bags': 'offline faster than real time rosbag',
+            'doc/questions': 'pandas region zone mask static furniture follow re-identification alternatives',
+            'doc/container': 'docker 22.04 24.04', 'doc/frames_and_time': 'localization synchronized',
+            'doc/other_cameras': 'color synchronized', 'doc/troubleshooting': 'jump drift ghost false positives slow'}
 extensions = ['myst_parser']
 myst_enable_extensions = ['dollarmath']
 highlight_language = 'none'
 myst_heading_anchors = 3  # links to #headings are those of the repository's own pages
 html_theme = 'alabaster'
-html_static_path, html_css_files = ['static'], ['style.css']
-html_theme_options = {'page_width': '1200px', 'body_max_width': '900px', 'sidebar_width': '240px',
-                      'code_font_size': '0.8em', 'description': 'People in 3D for a ROS 1 robot',
+html_static_path, html_css_files, html_js_files = ['static'], ['style.css'], ['copy.js']
+html_title, html_favicon = '%s %s' % (project, version), os.path.join(ROOT, 'doc', 'static', 'favicon.svg')
+html_theme_options = {'page_width': '1200px', 'body_max_width': '1000px', 'sidebar_width': '240px',
+                      'code_font_size': '0.75em', 'description': 'People in 3D for a ROS 1 robot, version ' + version,
                       'font_family': 'DejaVu Sans, sans-serif'}
 html_sidebars = {'**': ['about.html', 'searchbox.html', 'navigation.html']}
 html_show_sphinx = html_show_copyright = html_copy_source = False
 html_math_renderer = 'mathml'
 
 
-def _navigation(source):
-    """The sections of the first page as Sphinx's navigation: captions, and the links of the sections."""
-    captions = []
-    for section in source.split('\n## ')[1:]:
-        captions.append((section.splitlines()[0], [link.groups() for link in LINK.finditer(section)]))
+def _navigation():
+    """The sections of the contents as Sphinx's navigation: captions, and the links of the sections."""
+    with open(os.path.join(ROOT, CONTENTS + '.md'), encoding='utf-8') as stream:
+        sections = stream.read().split('\n## ')[1:]
+    captions = [('Contents', [('All pages', 'index.md')])]
+    for section in sections:
+        links = [link.groups() for link in LINK.finditer(section)]
+        captions.append((section.splitlines()[0], [
+            (text, path) for text, path in links if path != '../README.md' and path.endswith(('.md', '.rst'))]))
     names = set(os.path.splitext(name)[0] for name in os.listdir(os.path.join(ROOT, 'doc', 'nodes'))) - {'index'}
     captions.append(('Nodes', [('All nodes', 'nodes/index.md')] + [
         (name, 'nodes/%s.md' % name) for name in sorted(names)]))
-    captions.append(('Launch files', [('Launch files', 'launch_files.md')]))
-    return [(caption, ['%s </%s>' % (text, os.path.normpath(os.path.join('doc', path))[:-len('.md')])
+    captions.append(('Interfaces', [('Launch files', 'launch_files.md'), ('Messages', 'messages.md')]))
+    return [(caption, ['%s </%s>' % (text, os.path.splitext(os.path.normpath(os.path.join('doc', path)))[0])
                        for text, path in links]) for caption, links in captions]
 
 
@@ -49,12 +61,14 @@ def _prepare(_app, name, source):
     source[0] = LINK.sub(
         lambda link: link.group(1) if os.path.isdir(os.path.join(here, link.group(2))) else link.group(), source[0])
     if name == root_doc:
-        for caption, pages in _navigation(source[0]):
+        for caption, pages in _navigation():
             source[0] += '\n```{toctree}\n:hidden:\n:caption: %s\n\n%s\n```\n' % (caption, '\n'.join(pages))
+    if name in KEYWORDS:
+        source[0] = '---\nmyst:\n  html_meta:\n    keywords: %s\n---\n%s' % (KEYWORDS[name], source[0])
 
 
 def _write_first_page(app, _exception):
-    """A page at the root of the site, which leads to the contents."""
+    """A page at the root of the site, which leads to the README."""
     with open(os.path.join(app.outdir, 'index.html'), 'w') as stream:
         stream.write('<!DOCTYPE html><title>%s</title><meta http-equiv="refresh" content="0; url=%s.html">\n'
                      % (project, root_doc))

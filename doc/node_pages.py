@@ -1,4 +1,4 @@
-"""Write the pages of the nodes (doc/nodes), of the launch files (doc/launch_files.md), and config/*.yaml from the code.
+"""Write the pages of nodes (doc/nodes), launch files and messages (doc/*.md), and config/*.yaml from the code.
 
 `./run doc` runs it; in a sourced workspace: python3 doc/node_pages.py. The pages are not in the repository.
 Sources are the docstrings of a node's class and of the classes in ros_3d_bb.nodes that it uses, the tables of its
@@ -233,20 +233,20 @@ def node_page(node):
             rows = [(_code(entry.name), _type_link(entry.kind) + COMPRESSED.get((section, entry.kind), ''), entry.text)
                     for entry in node.sections[section]]
             title = 'service' if section in ('Services', 'Calls') else 'topic'
-            parts += ['## ' + section, _table((title, 'type', ''), rows)]
+            parts += ['## ' + section, _table((title, 'type', 'description'), rows)]
     parts.append('## Parameters')
     for section, parameters in itertools.groupby(parameters_of(node), lambda parameter: parameter.section):
         parts.append('### ' + section[0].upper() + section[1:] if section else '')
         rows = [(_code('~' + parameter.name), parameter.kind, parameter.default,
                  (parameter.text + ' ' + parameter.facts).strip()) for parameter in parameters]
-        parts.append(_table(('parameter', 'type', 'default', ''), rows))
+        parts.append(_table(('parameter', 'type', 'default', 'description'), rows))
     return _page(parts)
 
 
 def nodes_page():
     """The index of the pages of nodes, Markdown."""
     rows = [('[%s](%s.md)' % (node.name, node.name), node.summary) for node in nodes()]
-    return _page(['# Nodes', _table(('node', ''), rows)])
+    return _page(['# Nodes', _table(('node', 'description'), rows)])
 
 
 def launch_page():
@@ -255,16 +255,27 @@ def launch_page():
              'Start a launch file with `roslaunch ros_3d_bb NAME.launch`. `roslaunch --ros-args ros_3d_bb NAME.launch` '
              'lists its arguments.']
     for launch in launch_files():
-        rows = [(_code(name), 'required' if default is None else _code(default), doc)
+        rows = [(_code(name), doc, 'required' if default is None else _code(_computed(default)))
                 for name, default, doc in launch.arguments]
-        parts += ['## ' + launch.name, launch.text, _table(('argument', 'default', ''), rows)]
+        parts += ['## ' + launch.name, launch.text, _table(('argument', 'description', 'default'), rows)]
+    return _page(parts)
+
+
+def messages_page():
+    """The page of the message definitions, Markdown."""
+    parts = ['# Messages']
+    for path in sorted(glob.glob(os.path.join(ROOT, 'msg', '*.msg'))):
+        with open(path, encoding='utf-8') as stream:
+            parts += ['## ' + os.path.basename(path), '```text\n%s```' % stream.read()]
     return _page(parts)
 
 
 def pages():
     """{path: text} of all pages."""
     made = {'doc/nodes/%s.md' % node.name: node_page(node) for node in nodes()}
-    return dict(made, **{'doc/nodes/index.md': nodes_page(), 'doc/launch_files.md': launch_page()})
+    made.update({'doc/nodes/index.md': nodes_page(), 'doc/launch_files.md': launch_page(),
+                 'doc/messages.md': messages_page()})
+    return made
 
 
 def config_files():
@@ -284,11 +295,16 @@ def _table(titles, rows):
 
 def _type_link(kind):
     package, name = kind.split('/')
-    return '[%s](../../msg/%s.msg)' % (kind, name) if package == 'ros_3d_bb' else kind
+    return '[%s](../messages.md#%smsg)' % (kind, name.lower()) if package == 'ros_3d_bb' else kind
 
 
 def _code(text):
     return '`%s`' % text if text else 'empty'
+
+
+def _computed(default):
+    """A default without the syntax of roslaunch for an expression."""
+    return re.sub(r'^\$\(eval (.*)\)$', r'\1', default)
 
 
 def _one_line(text):

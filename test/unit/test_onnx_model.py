@@ -204,7 +204,7 @@ def test_a_network_with_unknown_outputs_is_described(tmp_path):
     with pytest.raises(WeightsError) as error:
         OnnxModel(path, 1)
     for part in (path, 'images [1, 3, 96, 128] tensor(float)', '[1, 77, 79]', '[1, 4]', 'yolov8 (1, 4 + classes, n)',
-                 'doc/detectors.md'):
+                 'doc/onnx.md'):
         assert part in str(error.value)
 
 

@@ -15,7 +15,7 @@ from support.small_session import write_small_session
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 PROGRAMS = sorted(os.path.basename(path) for path in glob.glob(os.path.join(ROOT, 'scripts', '*'))) + ['annotator']
 NODES = [name for name in PROGRAMS if name.endswith('_node')]
-FOLDERS = ('launch', 'config', 'rviz', 'msg', 'urdf', 'worlds')
+FOLDERS = ('launch', 'config', 'examples', 'rviz', 'msg', 'urdf', 'worlds')
 # Loads launch files, and prints their [nodes, parameters] by name.
 LOAD = """
 import glob, os, sys

@@ -86,7 +86,7 @@ def test_imports_of_the_tests_are_declared_or_in_their_requirements():
     assert [name for name in names
             if TEST_KEYS.get(name, KEYS.get(name) or name) not in known and name not in required] == []
     programs = declared('test_depend') - set(TEST_KEYS.values()) - names
-    assert programs == {'rosbash', 'rosservice', 'rostest', 'xdotool', 'xvfb'}
+    assert programs == {'rosbash', 'roscpp', 'rosservice', 'rostest', 'xdotool', 'xvfb'}
 
 
 def test_no_paths_of_this_machine_and_no_stamps_of_the_current_time():

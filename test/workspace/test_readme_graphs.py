@@ -43,6 +43,8 @@ TRACK_PRINTER = claimed('import rospy', 'python')
 DIAGNOSTICS = claimed('rostopic echo -n 1 /diagnostics')
 LIVE = [claimed('rosrun dynamic_reconfigure dynparam set /tracker_node ' + beginning) for beginning in ('pred', '"{')]
 MOUNT = claimed('rosrun tf2_ros static_transform_publisher')
+ON_NOETIC = claimed('sudo apt install ros-noetic-ros-base')
+DESK = claimed('source ~/catkin_ws/devel/setup.bash\nroslaunch ros_3d_bb pipeline.launch')
 SLIDERS = claimed('rosrun rqt_reconfigure')
 
 
@@ -50,6 +52,17 @@ SLIDERS = claimed('rosrun rqt_reconfigure')
 def test_launch_files_load_with_the_arguments_of_a_command(reader, beginning):
     printed = reader.types(LAUNCHES[beginning], replaced=[('roslaunch ', 'roslaunch --nodes ')])
     assert LOADED[beginning] <= set(printed.split())
+
+
+def test_a_camera_on_a_desk(reader, tmp_path):
+    """From the first package to tracks in RViz, with a driver that publishes no frames above camera_link."""
+    write_bag(scenario_images(scenario_from(dict(SCENE, duration=3.0))), str(tmp_path / 'scene.bag'))
+    (reader.etc / 'setup.bash').touch()
+    with reader.running(ON_NOETIC, DISPLAY=reader.screen(), READER_BAG=str(tmp_path / 'scene.bag')) as graph:
+        graph.hears('camera/color/camera_info')
+        graph.start(['bash', '-c', reader.typed(DESK)], cwd=str(reader.home))
+        graph.shows('RViz')
+        graph.hears(TRACKS)
 
 
 def test_another_detector(reader, tmp_path):

@@ -23,6 +23,7 @@ DEMO_AND_TESTS = claimed('./run demo\n./run test')
 BUILD = claimed('./run build')
 DEMO = claimed('./run demo weights:=')
 INSTALL, WEIGHTS = claimed('sudo apt install ros-noetic-ros-base'), claimed('cd && wget ')
+RUNTIMES = claimed("pip3 install torch 'onnxruntime<1.11' 'numpy<1.18'")
 RUNTIMES_ON_MELODIC = claimed("python3 -m pip install --upgrade 'pip<22'")
 DESCRIPTION = claimed('echo "source $HOME')
 UPSTART = claimed('cd ~/catkin_ws/src && catkin_create_pkg')
@@ -30,6 +31,7 @@ ARGUMENTS = claimed('roslaunch --ros-args')
 SAMPLE_BAG = claimed('cd && rosrun ros_3d_bb scenario_to_bag')
 RECORD = claimed('rosbag record -O my.bag ')
 PROCESS_BAG = claimed('rosrun ros_3d_bb process_bag some.bag')
+TRACKS_TO_CSV = claimed('rosrun ros_3d_bb scene_report result.bag --csv')
 PROCESS_BAGS = claimed('rosrun ros_3d_bb process_bag day1')
 SESSION_TO_BAG = claimed('rosrun ros_3d_bb session_to_bag')
 SCENARIO_TO_BAG = claimed('rosrun ros_3d_bb scenario_to_bag')
@@ -99,14 +101,14 @@ def test_build_prints_the_short_path(reader, clone):
 def test_a_robot_is_set_up(reader):
     """All commands in order; the stand-ins log what they are asked for."""
     (reader.etc / 'setup.bash').touch()
-    first_nodes = reader.types(INSTALL, replaced=[('roslaunch', 'roslaunch --nodes')])
+    first_nodes = [reader.types(block, replaced=[('roslaunch', 'roslaunch --nodes')]) for block in (INSTALL, RUNTIMES)]
     reader.types(RUNTIMES_ON_MELODIC, replaced=[('python3 -m pip', 'pip3')])
     for block in (WEIGHTS, DESCRIPTION, UPSTART):
         reader.types(block)
-    assert {'/simulator_node', '/people_node'} <= set(first_nodes.split())
+    assert {'/camera_realsense', '/simulator_node', '/people_node'} <= set(' '.join(first_nodes).split())
     logged = reader.log.read_text().splitlines()
     assert os.path.exists(str(reader.home / 'catkin_ws' / 'src' / 'ros_3d_bb' / 'package.xml'))
-    for command in ('git clone URL ros_3d_bb', 'rosdep install --from-paths src --ignore-src', 'catkin_make',
+    for command in ('git clone URL ros_3d_bb', 'rosdep install --from-paths src --ignore-src -r -y', 'catkin_make',
                     'pip3 install torch onnxruntime<1.11 numpy<1.18', 'pip3 install torch onnxruntime<1.11 numpy<1.17',
                     'systemctl restart ros', 'systemctl daemon-reload', 'systemctl start people'):
         assert command in logged
@@ -134,6 +136,8 @@ def test_one_or_many_bags_are_processed(reader, camera_bag):
                 part.write(topic, message, stamp)
     reader.types(PROCESS_BAG)
     reader.types(PROCESS_BAGS)
+    reader.types(TRACKS_TO_CSV)
+    assert (reader.home / 'tracks.csv').read_text().startswith('stamp_s,id,label,status,x_m,y_m,vx_mps,vy_mps')
     for path in ('result.bag', 'results/one.bag', 'results/two.bag'):
         with rosbag.Bag(str(reader.home / path)) as bag:
             assert bag.get_message_count('/ros_3d_bb/bb_3d') > 1

@@ -1,4 +1,5 @@
 """Report on the bag of a scene."""
+import csv
 import os
 import re
 import subprocess
@@ -14,7 +15,7 @@ from ros_3d_bb.bags.bag_writer import START_NS, write_bag
 from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg, time_from, tracks_from_msg, tracks_to_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb_lab.evaluation.demo.scene_report import (BOXES_TOPIC, ROBOT_COLOR, TRACKS_TOPIC, TRUTH_COLOR, draw_scene,
-                                                        main, paths_of, read_recording, write_report)
+                                                        main, paths_of, read_recording, write_csv, write_report)
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 
@@ -73,6 +74,18 @@ def test_without_ground_truth_the_tracks_are_listed(tmp_path):
         'track  images  first seen  last seen', '    7       9       0.0 s      0.8 s',
         'number of tracks: 1; 9 of 9 images answered']
     assert (tmp_path / 'tracked.png').exists()
+
+
+def test_tracks_are_written_as_a_table(bag, tmp_path):
+    write_csv(bag, str(tmp_path / 'tracks.csv'))
+    with open(str(tmp_path / 'tracks.csv'), newline='') as stream:
+        rows = list(csv.DictReader(stream))
+    with rosbag.Bag(bag) as opened:
+        people, _tracks = paths_of(read_recording(opened))
+    assert [(row['id'], row['label'], row['status']) for row in rows] == [('7', 'person', '0')] * 9
+    assert [float(row['stamp_s']) * 10 % 10 for row in rows] == pytest.approx(range(1, 10), abs=1e-5)
+    np.testing.assert_allclose([float(row['y_m']) - SHIFT_M for row in rows], np.array(people[1])[1:, 1])
+    assert rows[0]['var_x_m2'] == ''  # truth has no covariance
 
 
 @pytest.mark.parametrize('picture', ['no_such_folder/report.png', 'report.xyz'])

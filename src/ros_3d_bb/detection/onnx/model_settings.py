@@ -55,7 +55,7 @@ def read_settings(onnx_path):
     except FileNotFoundError:
         return ModelSettings()
     except (OSError, ValueError, yaml.YAMLError) as error:
-        raise WeightsError('%s, which describes %s, cannot be used (%s); fix or remove it, see doc/detectors.md'
+        raise WeightsError('%s, which describes %s, cannot be used (%s); fix or remove it, see doc/onnx.md'
                            % (path, os.path.basename(onnx_path), cause(error)))
 
 

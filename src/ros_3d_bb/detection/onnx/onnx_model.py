@@ -154,5 +154,5 @@ def _signature(session):
                        for entry in entries[:MAX_LISTED]) or 'none'
              for entries in (session.get_inputs(), session.get_outputs())]
     known = '; '.join('%s %s' % (name, head.shape) for name, head in HEADS.items())
-    return '. Inputs: %s. Outputs: %s. Known heads: %s. See doc/detectors.md' % (
+    return '. Inputs: %s. Outputs: %s. Known heads: %s. See doc/onnx.md' % (
         tuple(ascii(text[:MAX_LIST_LENGTH])[1:-1] for text in lists) + (known,))

@@ -2,6 +2,7 @@
 the table compares the tracks with truth.
 """
 import argparse
+import csv
 import os
 import pathlib
 import sys
@@ -28,6 +29,8 @@ from matplotlib import gridspec, pyplot  # noqa: E402 (the backend must be selec
 
 PANELS, COLUMNS = 6, 3
 SIZE_IN, LINE_IN, DPI = (14.56, 14.5), 0.17, 100
+CSV_COLUMNS = ('stamp_s', 'id', 'label', 'status', 'x_m', 'y_m', 'vx_mps', 'vy_mps', 'var_x_m2', 'cov_xy_m2',
+               'var_y_m2')
 TRUTH_COLOR, ROBOT_COLOR = '#aaaaaa', '#141414'
 
 
@@ -83,6 +86,19 @@ def table_of_tracks(moments):
     rows = [('%d' % number, '%d' % len(seen), '%.1f s' % ((seen[0] - first_ns) / NS),
              '%.1f s' % ((seen[-1] - first_ns) / NS)) for number, seen in sorted(stamps.items())]
     return ('track', 'images', 'first seen', 'last seen'), rows, 'number of tracks: %d' % len(rows)
+
+
+def write_csv(bag_path, csv_path):
+    """Write each track of each image in a bag as a row of CSV_COLUMNS; covariances are empty if unknown."""
+    with rosbag.Bag(bag_path) as bag, open(csv_path, 'w', newline='') as stream:
+        rows = csv.writer(stream)
+        rows.writerow(CSV_COLUMNS)
+        for _topic, message, _time in bag.read_messages(['/' + TRACKS_TOPIC]):
+            stamp = '%d.%09d' % (message.header.stamp.secs, message.header.stamp.nsecs)
+            for track in tracks_from_msg(message):
+                covariance = [''] * 3 if track.covariance is None else track.covariance[[0, 0, 1], [0, 1, 1]]
+                rows.writerow([stamp, track.id, track.label, track.status, *track.position_m[:2],
+                               *track.velocity_mps[:2], *covariance])
 
 
 def lines_of(header, rows):
@@ -202,10 +218,14 @@ def main():
     parser.add_argument('picture', nargs='?', help='image file to write (default: the name of the bag with .png)')
     parser.add_argument('--color-topic', default='', metavar='TOPIC',
                         help='colour images in the bag, if their topic is not %s' % COLOR_TOPIC)
+    parser.add_argument('--csv', default='', metavar='FILE', help='also write the tracks to this CSV file')
     arguments = parser.parse_args()
     picture = arguments.picture or os.path.splitext(arguments.bag)[0] + '.png'
     try:
         lines = write_report(arguments.bag, picture, arguments.color_topic)
+        if arguments.csv:
+            write_csv(arguments.bag, arguments.csv)
+            lines.append('table: %s' % arguments.csv)
     except (ValueError, OSError, rosbag.ROSBagException) as error:
         sys.exit('scene_report: %s: %s; no report was written' % (arguments.bag, error))
     print('\n'.join(lines + ['picture: %s' % picture, 'report: %s.html' % os.path.splitext(picture)[0]]))
