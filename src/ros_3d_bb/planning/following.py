@@ -19,8 +19,8 @@ from ros_3d_bb.tracking.types import VISIBLE
 NEAR_M, TURNING_MPS, FARTHEST_M = 0.5, 1.0, 2.0
 # A change of IDs is searched for in the last PATH_NS, and changes a track from SWITCHING_NS before the new one; chosen.
 PATH_NS, SWITCHING_NS = 3 * NS, NS // 2
-# A strangeness (see `_strangeness`) is clearly less than another one by this ratio and this difference; chosen.
-CLEARLY, LEAST_STRANGE = 0.5, 0.3
+# A distance (see `_normalized_distance`) is clearly less than another one by this ratio and this difference; chosen.
+CLEARLY, LEAST_DIFFERENCE = 0.5, 0.3
 LONGEST_PREDICTION_S = 2.0  # people who are lost for longer have probably turned or stopped; chosen
 GAIN = 1.0  # speed by distance, 1/s; chosen
 TURN_GAIN = 2.0  # rate by bearing, 1/s; chosen
@@ -103,7 +103,7 @@ class TargetSelector(object):
             first_ns = min(track.first_seen_ns for track in new)
             before = [entry for entry in self._path if entry[1] < first_ns - SWITCHING_NS][-1]
             old = own[0]._replace(first_seen_ns=stamp_ns)
-            self._change_to_nearest(new, before, stamp_ns, [_strangeness(old, before, stamp_ns)])
+            self._change_to_nearest(new, before, stamp_ns, [_normalized_distance(old, before, stamp_ns)])
         self._path.append(self._seen[self.target.id])
 
     def _recover(self, tracks, stamp_ns):
@@ -111,19 +111,19 @@ class TargetSelector(object):
         self._change_to_nearest(tracks, self._seen[self.target.id], stamp_ns, [])
 
     def _change_to_nearest(self, tracks, before, stamp_ns, others):
-        """Make the track that is nearest to where `before`, (track, stamp), is expected the target, if its strangeness
+        """Make the track that is nearest to where `before`, (track, stamp), is expected the target, if its distance
         is clearly less than those of the other tracks, than `others`, and than its own as that of another lost
         person."""
         visible = set(track.id for track in tracks if track.status == VISIBLE)
-        near = sorted(((_strangeness(track, before, stamp_ns), track.id) for track in tracks
+        near = sorted(((_normalized_distance(track, before, stamp_ns), track.id) for track in tracks
                        if track.id in visible and track.label == self.target.label), key=lambda each: each[0])
         if not near or near[0][0] > 1:
             return
-        strangeness, track_id = near[0]
+        distance, track_id = near[0]
         lost = [entry for key, entry in self._seen.items() if key != self.target.id and entry[1] < stamp_ns]
         others = others + [other for other, _id in near[1:]] + [
-            _strangeness(self._seen[track_id][0], entry, stamp_ns) for entry in lost]
-        if max(strangeness / CLEARLY, strangeness + LEAST_STRANGE) < min(others, default=np.inf):
+            _normalized_distance(self._seen[track_id][0], entry, stamp_ns) for entry in lost]
+        if max(distance / CLEARLY, distance + LEAST_DIFFERENCE) < min(others, default=np.inf):
             del self._seen[self.target.id]
             self.target = self._seen[track_id][0]
 
@@ -135,7 +135,7 @@ def _chosen(tracks, robot_m, track_id):
     return min(people, key=lambda track: np.linalg.norm(track.position_m[:2] - robot_m), default=None)
 
 
-def _strangeness(track, seen, stamp_ns):
+def _normalized_distance(track, seen, stamp_ns):
     """Distance of a track from where a lost one, (track, stamp) when last seen, is expected, relative to the distance
     within which it must be; infinite if both existed at the same time."""
     lost, seen_ns = seen
