@@ -36,7 +36,9 @@ set_up_system() {
 
 # ROS of Debian 11 calls Thread.isAlive, which the Python 3.9 of Debian 11 does not have: without it, nodes and roslaunch
 # end with an error. Only in a root file system of ./run.
-mend_root() { sed -i 's/\.isAlive()/.is_alive()/' $(grep -rl '\.isAlive()' "$debian_python"/ros*); }
+mend_root() {
+  { grep -rlZ '\.isAlive()' "$debian_python"/ros* || true; } | xargs -0r sed -i 's/\.isAlive()/.is_alive()/'
+}
 
 set_up_python() {
   local wanted; wanted=$(cat "$here"/test/requirements*.txt | sha1sum)
