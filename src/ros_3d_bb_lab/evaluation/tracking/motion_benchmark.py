@@ -68,7 +68,7 @@ def _clip(path):
 def scores_of(clips, rate_hz, noise_m=0.0, seed=0):
     """Scores of all predictions for the clips of one kind at a rate: {key: value} with the `KEYS`.
 
-    `coverage` is the share 0..1 inside the 95 % ellipse, `area` the mean area of the ellipse, and `nll` the mean negative
+    `coverage` is the share 0..1 inside the 95 % ellipse, `area` its mean area, and `nll` the mean negative
     log likelihood of the true position, in nats with metres. Values are None without predictions.
     """
     tracker, rows = Tracker(PARAMS), []
