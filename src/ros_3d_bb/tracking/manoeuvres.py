@@ -8,7 +8,6 @@ The reach is the distance that a person covers in the time between two images. I
 not from the prediction, because the prediction overshoots where a person turns. A track without a box in the latest
 image has no such reach: the person may be occluded, and the box that of another one.
 """
-import collections
 import math
 
 from ros_3d_bb.core.time_sync import NS
@@ -32,11 +31,18 @@ def match_manoeuvres(tracks, measurements, matches, latest_ns, stamp_ns, height_
     of the tracks become as uncertain as their motion to the measurement.
     """
     seen = [track for track in tracks if latest_ns <= track.last_ns < stamp_ns]
-    candidates = [(track, measurement) for track in seen for measurement in measurements
-                  if _is_within_reach(track, measurement, stamp_ns, height_sigma_m)]
     matched = set(id(part) for match in matches for part in match)
-    counts = collections.Counter(id(part) for pair in candidates for part in pair)
-    pairs = [pair for pair in candidates if all(counts[id(part)] == 1 and id(part) not in matched for part in pair)]
+
+    def is_within_reach(track, measurement):
+        return _is_within_reach(track, measurement, stamp_ns, height_sigma_m)
+
+    pairs = []
+    for track in seen:
+        if id(track) not in matched:
+            near = [measurement for measurement in measurements if is_within_reach(track, measurement)]
+            if len(near) == 1 and id(near[0]) not in matched and not any(
+                    is_within_reach(other, near[0]) for other in seen if other is not track):
+                pairs.append((track, near[0]))
     for track, measurement in pairs:
         elapsed_s = (stamp_ns - track.last_ns) / NS
         speed_mps = max(_distance_m(track, measurement) - BESIDE_M, 0) / elapsed_s
