@@ -59,7 +59,7 @@ class FollowNode(object):
     Services
     --------
     ~enable : std_srvs/SetBool
-        Starts to follow (true), whom is chosen again, or stops (false).
+        Chooses a person again and follows (true), or stops (false).
     """
 
     def __init__(self):

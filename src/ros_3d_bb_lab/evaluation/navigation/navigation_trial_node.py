@@ -87,7 +87,7 @@ class NavigationTrialNode(object):
     camera/points : sensor_msgs/PointCloud2
         Points of the depth images of each camera; only with ~cloud.
     ros_3d_bb/tracks : ros_3d_bb/TrackedObjectArray
-        True tracks of the people whom a camera shows; only with ~visible.
+        True tracks of the people in view of a camera; only with ~visible.
     scan : sensor_msgs/LaserScan
         Scan of an ideal laser at the centre of the robot; only with ~scan.
     simulator_node/time_limit : std_msgs/Time

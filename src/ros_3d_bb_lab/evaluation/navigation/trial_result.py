@@ -56,7 +56,7 @@ class Pace(object):
 
 
 class VisiblePeople(object):
-    """People whom at least one camera shows. The cameras take turns, and each reports all people with a status."""
+    """People in view of at least one camera. The cameras take turns, and each reports all people with a status."""
 
     def __init__(self, cameras):
         self._visible = collections.deque(maxlen=cameras)
