@@ -28,7 +28,7 @@ myst_enable_extensions = ['dollarmath']
 highlight_language = 'none'
 myst_heading_anchors = 3  # links to #headings are those of the repository's own pages
 html_theme = 'alabaster'
-html_static_path, html_css_files, html_js_files = ['static'], ['style.css'], ['copy.js']
+html_static_path, html_css_files, html_js_files = ['static'], ['style.css'], ['site.js']
 html_title, html_favicon = '%s %s' % (project, version), os.path.join(ROOT, 'doc', 'static', 'favicon.svg')
 html_theme_options = {'page_width': '1200px', 'body_max_width': '1000px', 'sidebar_width': '240px',
                       'code_font_size': '0.75em', 'description': 'People in 3D for a ROS 1 robot, version ' + version,
