@@ -32,6 +32,7 @@ KEYWORDS = {
     'doc/rviz': 'visualization display', 'doc/security': 'privacy GDPR',
     'doc/topics': 'API interface subscriber message', 'doc/tracking': 'MOT SORT reid re-identification neighbor',
     'doc/troubleshooting': 'jump drift ghost false positives slow error', 'doc/tuning': 'settings parameters yaml'}
+FOLDERS = {'msg': 'doc/messages.md', 'config': 'doc/nodes/index.md'}
 extensions = ['myst_parser']
 myst_enable_extensions = ['dollarmath']
 highlight_language = 'none'
@@ -65,10 +66,17 @@ def _navigation():
 
 
 def _prepare(_app, name, source):
-    """Tell Sphinx the navigation, and keep only the words of links to folders, which no site has."""
+    """Tell Sphinx the navigation, and lead links to folders to the generated pages; other folders are words only."""
     here = os.path.dirname(os.path.join(ROOT, name))
-    source[0] = LINK.sub(
-        lambda link: link.group(1) if os.path.isdir(os.path.join(here, link.group(2))) else link.group(), source[0])
+
+    def linked(link):
+        folder = os.path.join(here, link.group(2))
+        if not os.path.isdir(folder):
+            return link.group()
+        page = FOLDERS.get(os.path.relpath(folder, ROOT))
+        return '[%s](%s)' % (link.group(1), os.path.relpath(os.path.join(ROOT, page), here)) if page else link.group(1)
+
+    source[0] = LINK.sub(linked, source[0])
     if name == root_doc:
         for caption, pages in _navigation():
             source[0] += '\n```{toctree}\n:hidden:\n:caption: %s\n\n%s\n```\n' % (caption, '\n'.join(pages))
