@@ -1,4 +1,5 @@
-// A button that copies the text of a block of code; in tables, line breaks after / and _ and, for phones, titles of columns.
+// A button that copies the text of a block of code. In tables: lines break after / and _, and not before units; titles of
+// columns, for phones.
 document.addEventListener('DOMContentLoaded', () => {
   for (const block of document.querySelectorAll('div.highlight')) {
     const button = document.createElement('button');
@@ -10,7 +11,10 @@ document.addEventListener('DOMContentLoaded', () => {
   }
   for (const table of document.querySelectorAll('table.docutils')) {
     const titles = [...table.querySelectorAll('th')].map(title => title.textContent);
-    for (const cell of table.querySelectorAll('td')) cell.dataset.title = cell.textContent && titles[cell.cellIndex];
+    for (const cell of table.querySelectorAll('td')) {
+      cell.dataset.title = cell.textContent && titles[cell.cellIndex];
+      cell.innerHTML = cell.innerHTML.replace(/(\d) (%|(?:mm?|m?s|m\/s|MB|Hz)\b)/g, '$1&nbsp;$2');
+    }
     for (const code of table.querySelectorAll('code span.pre')) code.innerHTML = code.innerHTML.replace(/[/_]/g, '$&<wbr>');
   }
 });
