@@ -201,9 +201,9 @@ def _mount(seen):
         yield Finding('image rotation', '', '%d people are found in %d images, and %d if they are turned clockwise by '
                       '%d degrees' % (mount.people[0], mount.images, mount.people[mount.turns], 90 * mount.turns),
                       'pass image_rotation:=%d (process_bag: --image-rotation %d)' % (2 * (90 * mount.turns,)))
-    if mount.height_m is not None:
+    if mount.pose is not None:
         yield Finding('floor', 'the camera is %.2f m above it, tilted by %.2f rad and rolled by %.2f rad; fitted to '
-                      'the depth images' % (mount.height_m, mount.tilt_rad, mount.roll_rad))
+                      'the depth images' % mount.pose)
 
 
 def _pairs_of_boxes(seen):
