@@ -154,7 +154,7 @@ def _process(job):
     except Exception as error:  # a damaged bag can raise any exception
         print('%s; no bag was written' % _reason(job, error), file=sys.stderr, flush=True)
         return False
-    print('\n'.join(['%s:' % job.target] + _summary(events)), flush=True)
+    print('\n'.join(['%s:' % job.target] + _summary(events, job.settings.detector)), flush=True)
     return True
 
 
@@ -163,33 +163,37 @@ def _reason(job, error):
     if isinstance(error, BagError):
         return str(error)
     if isinstance(error, (ValueError, OSError)):
-        return '%s: %s' % (job.source, with_places(str(error), option_of))
+        return '%s: %s' % (job.source, with_places(str(error), lambda name: option_of(name, job.settings.detector)))
     return '%s: %s: %s' % (job.source, type(error).__name__, cause(error))
 
 
-def option_of(name):
-    """Return the option that sets a parameter of a node; empty if no node has it."""
+def option_of(name, detector):
+    """Return the option that sets a parameter of the nodes with a detector; empty if no node has it."""
     if name in OPTIONS:
         return '--' + name.replace('_', '-')
-    files = [option for option, node in FILES if any(name in part._fields for part in getattr(Settings(), node))]
-    return ' or '.join(files) + ' FILE' if files else ''
+    unused = {'yolov5', 'depth'} - {detector}
+    files = [option + ' FILE' for option, node in FILES
+             if node not in unused and any(name in part._fields for part in getattr(Settings(), node))]
+    return ' and '.join(files)
 
 
-def _summary(events):
-    lines = ['  %7d  %s%s' % (count, event, '. The first: %s' % with_places(events.sentences[event], option_of)
+def _summary(events, detector):
+    def placed(event):
+        return with_places(events.sentences[event], lambda name: option_of(name, detector))
+
+    lines = ['  %7d  %s%s' % (count, event, '. The first: %s' % placed(event)
                               if event in events.sentences else '') for event, count in events.counts.items()]
-    return lines + ([] if events.counts.get(TRACKED) else ['no tracks: ' + _why_no_tracks(events)])
+    return lines + ([] if events.counts.get(TRACKED) else ['no tracks: ' + _why_no_tracks(events, placed)])
 
 
-def _why_no_tracks(events):
+def _why_no_tracks(events, placed):
     """Return the likely cause if no track was written, as a sentence."""
     counts = events.counts
+    event = max(set(events.sentences) - {POSE_FITTED}, key=lambda each: (counts[each], each), default=None)
+    if event is not None and counts[event] > counts.get('images tracked', 0):
+        return placed(event)
     if counts.get('images tracked') and counts.get('boxes estimated'):
         return 'none of %d 3D boxes was confirmed by later images' % counts['boxes estimated']
-    causes = set(events.sentences) - {POSE_FITTED}
-    if not counts.get('images tracked') and causes:
-        event = max(causes, key=lambda each: (counts[each], each))
-        return with_places(events.sentences[event], option_of)
     if counts.get('boxes without depth'):
         return 'none of %d 2D boxes has depth' % counts['boxes without depth']
     return ('no people were detected; rosrun ros_3d_bb doctor BAG checks the images and the orientation of the camera '

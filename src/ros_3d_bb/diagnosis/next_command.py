@@ -59,8 +59,10 @@ def _raw_topic(seen, is_misaligned):
 
 def _pose(mount):
     """Return the options for the pose of a camera without tf, from its CameraMount or None, and a hint."""
-    turned = ' --image-rotation %d' % (90 * mount.turns) if mount is not None and mount.turns else ''
-    if mount is None or mount.pose is None:
+    if mount is None:  # raw depth, or other stamps than those of colour
+        return ' --camera-pose floor', '; height, tilt and roll of the camera are fitted to the floor in the depth images'
+    turned = ' --image-rotation %d' % (90 * mount.turns) if mount.turns else ''
+    if mount.pose is None:
         return (' --camera-height HEIGHT --camera-tilt TILT' + turned,
                 '; fill in the height of the camera above the floor, metres, and its tilt, radians, positive if it '
                 'looks down')
