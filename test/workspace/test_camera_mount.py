@@ -119,14 +119,16 @@ def test_the_roll_of_a_camera_is_given_or_fitted_to_the_floor(rolled):
         '/yolo_bounding_box']) for options in found)
     assert abs(fitted - with_roll) <= 3 and min(fitted, with_roll) > 1.3 * without
     for options in list(found)[1:]:
-        tracks_m = np.array([track.position_m[:2] for track in tracks_from_msg(found[options]['/ros_3d_bb/tracks'][-1])])
+        last = tracks_from_msg(found[options]['/ros_3d_bb/tracks'][-1])
+        tracks_m = np.array([track.position_m[:2] for track in last])
         apart_m = np.linalg.norm(tracks_m[:, None] - truth_m, axis=2)
         assert apart_m.shape == (3, 3) and apart_m.min(axis=0).max() < 0.15, options
 
 
 def doctor_on(path):
     """The facts and faults {subject: text} that the doctor finds in a bag, and the next command."""
-    found, command, _purpose = bag_findings(argparse.Namespace(bag=str(path), camera='', target_frame='', depth='aligned'))
+    given = argparse.Namespace(bag=str(path), camera='', target_frame='', depth='aligned')
+    found, command, _purpose = bag_findings(given)
     return {finding.subject: finding.fault or finding.fact for finding in found}, command
 
 

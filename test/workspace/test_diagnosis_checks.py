@@ -86,7 +86,7 @@ CASES = [
      'rgb8'),
     (with_stream(DEPTH, stamps_ns=(), lag_s=None), 'stamps', 'no stamp (zero)', 'set it to the time'),
     (with_stream(DEPTH, stamps_ns=STAMPS[:40]), 'stamps', '10 of 50 messages', 'set it to the time'),
-    (with_stream(DEPTH, stamps_ns=STAMPS[:1] * 50), 'stamps', '49 of 50 messages on /camera/depth have the stamp of the',
+    (with_stream(DEPTH, stamps_ns=STAMPS[:1] * 50), 'stamps', '49 of 50 messages on /camera/depth have the stamp',
      'set it to the time'),
     (with_stream(COLOR, stamps_ns=moved(STAMPS, 2.0 ** 31)), 'stamps', 'the year 2038', 'clock'),
     (with_stream(DEPTH, lag_s=9e6), 'stamps', '104.2 days before ROS time', 'use_sim_time true'),

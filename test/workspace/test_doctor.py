@@ -197,7 +197,8 @@ def test_the_pose_of_a_raw_camera_alone_is_fitted_to_the_floor(bag, tmp_path):
     for _step in range(2):
         process = next_command_in(process, tmp_path)
     assert '--detector depth --depth raw' in process and '--camera-pose floor' in process
-    printed = subprocess.run(['bash', '-c', process], cwd=str(tmp_path), stdout=subprocess.PIPE, universal_newlines=True)
+    printed = subprocess.run(['bash', '-c', process], cwd=str(tmp_path), stdout=subprocess.PIPE,
+                             universal_newlines=True)
     assert 'the camera is 0.2' in printed.stdout and 'images with tracks' in printed.stdout
 
 

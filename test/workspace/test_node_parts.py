@@ -32,7 +32,8 @@ def test_a_node_that_cannot_start_names_the_launch_argument(name, parts, place):
             as mocked, mock.patch.object(startup, 'Registration'), pytest.raises(SystemExit):
         startup.run_node(name, node, parts=parts)
     text, *values = mocked['logfatal'].call_args[0]
-    assert text % tuple(values) == '/%s cannot start: parameter ~stride is 0; the service ~enable works%s' % (name, place)
+    expected = '/%s cannot start: parameter ~stride is 0; the service ~enable works%s' % (name, place)
+    assert text % tuple(values) == expected
 
 
 def test_launch_files_have_the_arguments_that_messages_name():

@@ -232,8 +232,8 @@ def _parser():
                         'the camera, radians; positive: it looks down (default: 0)')
     parser.add_argument('--camera-roll', type=float, default=0.0, metavar='RAD', help='with --camera-height, roll of '
                         'the camera, radians; positive: its right side is lower (default: 0)')
-    parser.add_argument('--camera-pose', choices=(FLOOR,), help='for a bag without tf: fit height, tilt and roll of the '
-                        'camera to the floor in the depth images')
+    parser.add_argument('--camera-pose', choices=(FLOOR,), help='for a bag without tf: fit height, tilt and roll of '
+                        'the camera to the floor in the depth images')
     parser.add_argument('--image-rotation', choices=IMAGE_ROTATION.choices, help='clockwise rotation that makes the '
                         'images upright, degrees (default: auto, from tf)')
     parser.add_argument('--cameras', metavar='NAMES', help='namespaces of several cameras, separated by commas (front, '

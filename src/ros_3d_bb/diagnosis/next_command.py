@@ -60,7 +60,7 @@ def _raw_topic(seen, is_misaligned):
 def _pose(mount):
     """Return the options for the pose of a camera without tf, from its CameraMount or None, and a hint."""
     if mount is None:  # raw depth, or other stamps than those of colour
-        return ' --camera-pose floor', '; height, tilt and roll of the camera are fitted to the floor in the depth images'
+        return ' --camera-pose floor', '; height, tilt and roll of the camera are fitted to the floor in its images'
     turned = ' --image-rotation %d' % (90 * mount.turns) if mount.turns else ''
     if mount.pose is None:
         return (' --camera-height HEIGHT --camera-tilt TILT' + turned,
