@@ -59,7 +59,7 @@ def _raw_topic(seen, is_misaligned):
 
 def _pose(mount):
     """Return the options for the pose of a camera without tf, from its CameraMount or None, and a hint."""
-    if mount is None:  # raw depth, or other stamps than those of colour
+    if mount is None:  # of raw depth
         return ' --camera-pose floor', '; height, tilt and roll of the camera are fitted to the floor in its images'
     turned = ' --image-rotation %d' % (90 * mount.turns) if mount.turns else ''
     if mount.pose is None:
