@@ -10,7 +10,7 @@ import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.core.labels import PERSON
-from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M
+from ros_3d_bb.core.valid_ranges import MAX_COORDINATE_M, MAX_SIZE_M
 
 # A box whose edge is this close to the image border, in pixels plus a share of its extent, counts as truncated. Chosen:
 # detectors regress the edge of a truncated person up to 8 pixels inside the image, farther for larger boxes. A person
@@ -57,11 +57,11 @@ class Box3D(NamedTuple):
 
     @property
     def is_plausible(self):
-        """Whether the centre is nearer than `FARTHEST_M`, and width and height are between 0 and `LARGEST_M`."""
+        """Whether the centre is nearer than `MAX_COORDINATE_M`, and width and height are between 0 and `MAX_SIZE_M`."""
         x_m, y_m, z_m = self.center_m.tolist()
         width_m, height_m, _width_m = self.size_m.tolist()
-        return (0 < width_m < LARGEST_M and 0 < height_m < LARGEST_M
-                and abs(x_m) < FARTHEST_M and abs(y_m) < FARTHEST_M and abs(z_m) < FARTHEST_M)
+        return (0 < width_m < MAX_SIZE_M and 0 < height_m < MAX_SIZE_M
+                and abs(x_m) < MAX_COORDINATE_M and abs(y_m) < MAX_COORDINATE_M and abs(z_m) < MAX_COORDINATE_M)
 
 
 def plausible(box):

@@ -233,7 +233,7 @@ def _arguments():
                         help='folder of CSV files with the columns %s (default: $ROS_3D_BB_DATA/data/trajectories if '
                         'it exists, otherwise generated trajectories)' % ','.join(COLUMNS))
     parser.add_argument('--detections', metavar='DIR', help='track recorded 3D detections instead: a folder of '
-                        'recordings, see doc/benchmarks.md')
+                        'recordings, see doc/benchmark_methods.md')
     parser.add_argument('--rates', action='store_true', help='compare our tracker with perfect data association by '
                         'image rate instead: the pedestrians, and the recordings of --detections if it is given')
     parser.add_argument('--every', type=int, default=1, metavar='N', help='of --detections: use each N-th image')
