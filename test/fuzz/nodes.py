@@ -12,6 +12,7 @@ from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, TRACKS_TOPIC, tim
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.yolov5.predictions import Backend
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
+from ros_3d_bb.nodes.camera_pose_node import CameraPoseNode
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
 from ros_3d_bb.nodes.follow_node import FollowNode
 from ros_3d_bb.nodes.people_removal_node import PeopleRemovalNode
@@ -63,6 +64,7 @@ TARGETS = {
     'tracker_node': Target(lambda _source: TrackerNode(), {'tf_timeout': 0.0}, TRACKS_TOPIC),
     'yolov5_node': Target(_yolov5, {'weights': 'noise.pt', 'image_size': 64}, BOXES_TOPIC),
     'depth_detector_node': Target(lambda _source: DepthDetectorNode(), {}, BOXES_TOPIC),
+    'camera_pose_node': Target(lambda _source: CameraPoseNode(), {}, ''),
     'people_removal_node': Target(lambda _source: PeopleRemovalNode(),
                                   {'inputs': 'scan, points, depth', 'tf_timeout': 0.0}, '~scan_static'),
     'planner_bridge_node': Target(lambda _source: PlannerBridgeNode(), {'tf_timeout': 0.0}, '~points'),

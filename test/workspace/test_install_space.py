@@ -28,7 +28,8 @@ for path in glob.glob(os.path.join(sys.argv[1], '*.launch')):
                                      {name: str(given.value).strip() for name, given in config.params.items()}]
 print(yaml.safe_dump(found))
 """
-ARGUMENTS = ['weights:=/weights.pt', 'bag:=/some.bag', 'session:=/session', 'record:=/record.json']
+ARGUMENTS = ['weights:=/weights.pt', 'bag:=/some.bag', 'session:=/session', 'record:=/record.json',
+             'camera_pose:=floor']
 
 
 def built(tmp_path_factory, *options, **environment):

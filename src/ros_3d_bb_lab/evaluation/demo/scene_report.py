@@ -68,7 +68,8 @@ def read_recording(bag):
     if not tracks:
         reason = ('but 3D boxes: probably tf lacks the pose of the camera; rosrun ros_3d_bb doctor checks it'
                   if topics_of_cameras(bag, BOXES3D_TOPIC) else
-                  'a recorded run of simulation.launch, or a result of process_bag expected')
+                  'a recorded run of simulation.launch, or a result of process_bag expected, in which rosrun ros_3d_bb '
+                  'doctor finds the cause')
         raise ValueError('the bag has no messages on /%s; %s' % (TRACKS_TOPIC, reason))
     frames = set(message.header.frame_id for by_stamp in (truth, tracks) for message in by_stamp.values())
     if len(frames) > 1:
