@@ -240,10 +240,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self.pane.update_unit()
 
     def _keep_draft(self, texts):
-        try:
-            self.document.set_draft(self.current, texts)
-        except (ValueError, OSError) as error:
-            self.pane.truth.show_problem(str(error))
+        self.document.set_draft(self.current, texts)
 
     def _show_state(self):
         done, count = self.document.progress if self.document is not None else (0, 0)

@@ -7,7 +7,7 @@ from ros_3d_bb_annotator.qt import QtCore, QtGui, QtWidgets, Signal
 FIELDS = (('x', '&X (right)'), ('z', '&Z (ahead)'), ('y', '&Y (down)'))
 WARNING = '#a04000'
 UNITS = ('mm', 'm')
-TYPING_MS = 300  # typed text is saved after a pause of this length
+TYPING_MS = 300  # typed text is kept after a pause of this length
 
 
 class LengthEdit(QtWidgets.QLineEdit):
