@@ -27,8 +27,8 @@ EVERY = 200  # images between checks with valid messages
 WAITING = 103  # inputs without an outcome: capacity of `StampSynchronizer` and the worker
 # Counters of the input of a node: received, published, and reasons for not being published.
 OUTCOMES = {
-    'yolov5_node': ('colour images received', 'images processed', 'images rejected', 'images skipped for a newer one',
-                    'images while paused', 'detections failed'),
+    'yolov5_node': ('colour images received', 'images processed', 'colour images rejected', 'images rejected',
+                    'images skipped for a newer one', 'images while paused', 'detections failed'),
     'depth_detector_node': ('colour images received', 'images processed', 'colour images rejected',
                             'colour images from before a time jump', 'images rejected',
                             'images skipped for a newer one', 'images without floor', 'images while paused',
@@ -58,7 +58,7 @@ class Network(Backend):
     def __call__(self, _image, least):
         if self._source is None:
             return np.zeros((0, 7), np.float32)
-        rows = np.array(self._source.numbers(35)).reshape(5, 7)
+        rows = np.array([self._source.number() for _number in range(35)]).reshape(5, 7)
         with np.errstate(over='ignore', invalid='ignore'):
             rows = rows.astype(np.float32)
             return rows[rows[:, 4] > least]
@@ -128,10 +128,10 @@ def _quiet():
 def _messages_of(source, now_ns, connections):
     """Messages of one image, valid or not, in random order."""
     good = hostile.good_messages(now_ns)
-    makers = hostile.makers(source, now_ns, good, 0.5)
-    topics = [topic for topic in sorted(connections.subscribers) if topic in makers]
+    topics = [topic for topic in sorted(connections.subscribers) if topic in good]
     source.shuffle(topics)
-    return [(topic, good[topic] if source.random() < 0.4 else makers[topic]()) for topic in topics]
+    return [(topic, good[topic] if source.random() < 0.4 else hostile.damaged(source, topic, good[topic], now_ns))
+            for topic in topics]
 
 
 def _send_transforms(connections, stamp_ns):
