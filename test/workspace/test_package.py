@@ -20,8 +20,7 @@ KEYS = {'numpy': 'python3-numpy', 'cv2': 'python3-opencv', 'torch': 'python3-tor
         'yaml': 'python3-yaml', 'matplotlib': 'python3-matplotlib', 'scipy': 'python3-scipy',
         'norfair': None, 'trackeval': None, 'pyrealsense2': None,
         'PyQt5': None}  # part of python_qt_binding, and used without it
-TEST_KEYS = {'pytest': 'python3-pytest', 'hypothesis': 'python3-hypothesis',
-             'catkin_pkg': 'python3-catkin-pkg-modules'}
+TEST_KEYS = {'pytest': 'python3-pytest', 'hypothesis': 'python3-hypothesis'}
 # What Melodic's own Python packages need on Python 3.
 FOR_MELODIC = {'python3-gnupg', 'python3-pycryptodome'}
 FOR_DEBIAN = {'tf2_tools'}  # which has programs of tf2_ros there
@@ -79,7 +78,7 @@ def test_nodes_that_rarely_draw_images_do_not_load_opencv(node):
 def test_imports_of_the_tests_are_declared_or_in_their_requirements():
     names = imported(glob.glob(inside('test', '**', '*.py'), recursive=True))
     # gazebo_msgs: test/gazebo needs Gazebo; people_msgs: real or a stand-in
-    names -= {'support', 'fuzz', 'soak', 'conftest', 'gazebo_msgs', 'people_msgs'}
+    names -= {'support', 'fuzz', 'test_faults', 'conftest', 'gazebo_msgs', 'people_msgs'}
     with open(inside('test', 'requirements.txt')) as stream:
         required = set(re.findall(r'^([\w-]+)', stream.read(), re.MULTILINE))
     known = declared('depend', 'exec_depend', 'test_depend')

@@ -48,17 +48,6 @@ def test_messages_in_the_table_of_symptoms_are_in_the_code():
     assert [message for message in quoted if not any(message in text for text in texts)] == []
 
 
-def test_figures_of_the_readme_are_in_the_section_they_link_to():
-    benchmarks, rows = text_of('doc/benchmarks.md'), text_of('README.md').split('## Accuracy and speed\n')[1]
-    rows = re.findall(r'^- \[.*?\]\(doc/benchmarks.md#([\w-]+)\)(.*)$', rows.split('\n## ')[0], re.MULTILINE)
-    assert len(rows) >= 5
-    for anchor, text in rows:
-        section, = [part for part in re.split(r'^## ', benchmarks, flags=re.MULTILINE)
-                    if part.splitlines()[0].lower().replace(' ', '-') == anchor]
-        for figure in re.findall(r'\*\*([\d.]+)', text):
-            assert re.search(r'(?<![\d.])%s(?![\d])' % re.escape(figure), section), (anchor, figure)
-
-
 @pytest.mark.parametrize('page', NAMED)
 def test_named_files_and_launch_arguments_exist(page):
     known = set(argument.get('name') for path in glob.glob(os.path.join(ROOT, 'launch', '*'))
