@@ -26,6 +26,7 @@ FOR_MELODIC = {'python3-gnupg', 'python3-pycryptodome'}
 FOR_DEBIAN = {'tf2_tools'}  # which has programs of tf2_ros there
 OPTIONAL = {'move_base'}  # of navigation.launch, for robots that have it
 NODES = {node.name: node for node in node_pages.nodes()}
+INSTALLED = 'launch', 'config', 'rviz', 'urdf', 'worlds'
 REQUIRED_ARGUMENTS = ['weights:=yolov5n.pt', 'bag:=some.bag', 'session:=/some/session', 'record:=/some/record.json',
                       'camera_height:=1.2']
 
@@ -137,10 +138,13 @@ def test_parameter_files_are_read_as_the_defaults(path, node):
 def test_launch_files_load_and_document_their_arguments(name):
     for argument in ElementTree.parse(inside('launch', name)).getroot().findall('arg'):
         assert argument.get('doc') or argument.get('value'), '%s: %s' % (name, argument.get('name'))
-    _parameters, nodes = loaded(name, *REQUIRED_ARGUMENTS)
+    parameters, nodes = loaded(name, *REQUIRED_ARGUMENTS)
     assert nodes
     for node in nodes.values():
         assert node.package != 'ros_3d_bb' or os.path.exists(inside('scripts', node.type))
+    for value in parameters.values():  # files, which are installed
+        if str(value).startswith(ROOT + os.sep):
+            assert os.path.exists(value) and os.path.relpath(value, ROOT).split(os.sep)[0] in INSTALLED, value
 
 
 @pytest.mark.parametrize('name', ['yolov5.launch', 'bbox3d.launch', 'tracker.launch', 'depth_detector.launch',
