@@ -16,7 +16,8 @@ run_tests() {
     --long)
       [ $# -eq 1 ] || fail "test --long takes no further arguments, not '$2'"
       pytest_options+=(--long)
-      run_some_tests "$here/test/workspace" ;;
+      run_some_tests "$here/test/workspace"
+      rostest "$here/test/nodes/soak.test" minutes:=2 ;;
     --platform) test_on_platform "${@:2}" ;;
     *) run_some_tests "$@" ;;
   esac
