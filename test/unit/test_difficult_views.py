@@ -146,6 +146,24 @@ def test_a_person_on_a_couch(height_m, ahead_m):
     assert person.center_m == pytest.approx(alone.center_m, abs=0.1)
 
 
+@pytest.mark.parametrize('ahead_m,wall_m', [(2.4, 4.0), (3.0, 6.0)])
+def test_a_person_behind_a_table_below_a_tilted_camera_in_a_loose_box(ahead_m, wall_m):
+    """The wall is one compact layer because the tilt is known, and larger than the person in a loose box."""
+    furniture = [{'at': [ahead_m - 0.6, 0.4], 'size': [0.7, 1.4, 0.74]},
+                 {'at': [ahead_m + 0.33, 0.4], 'size': [0.06, 0.45, 0.95]}]
+    simulator = simulator_of([{'start': [ahead_m, 0.4], 'facing': 3.0, 'height': 1.7, 'crouch': 0.6}], 2.35, 28,
+                             furniture=furniture, wall_m=wall_m)
+    frame, random = simulator.frame(0), np.random.RandomState(2)
+    camera_from_map = np.linalg.inv(frame.poses.map_from_camera)
+    tight_px = np.array(frame.people[0].box_px)
+    extents_px = np.tile(tight_px[2:] - tight_px[:2], 2)
+    for _draw in range(20):
+        rect_px = np.clip(tight_px + random.uniform(0, 0.6, 4) * extents_px * [-1, -1, 1, 1], 0, [640, 480] * 2)
+        box, = estimate_boxes(DepthImage(frame.depth_mm, 0.001), [tuple(map(int, rect_px))], simulator.camera,
+                              estimator_named('foreground'), level_from_camera=level_rotation(camera_from_map[:3, 2]))
+        assert plane_errors_m([(frame.people[0], box, camera_from_map)])[0] < 0.3
+
+
 def test_heights_below_a_tilted_camera():
     scenes = [simulator_of([{'start': [3.4, 0.4 * side], 'facing': 3.0, 'height': 1.75}], 2.35, 28, seed=seed)
               for seed, side in enumerate((-2, -1, 0, 1, 2))]

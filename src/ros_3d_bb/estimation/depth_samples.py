@@ -25,6 +25,9 @@ BODY_HALF_DEPTH_MM, TRUNK_HALF_DEPTH_MM = 350, 250
 BIN_MM, LAYER_BINS = 50, 5  # of the depth histogram; chosen: a layer is as thick as a trunk
 # The nearest layer with at least this share of the largest layer weight is the person. Chosen: flying pixels have less.
 FIRST_LAYER_SHARE = 0.5
+# Chosen: with fewer samples of the outline, it is not known what surrounds the object. What fills the outline keeps
+# this share of its weight, because a rectangle may be smaller than its object.
+LEAST_OUTLINE, LEAST_INSIDE = 10, 0.1
 EDGE_PERCENT = 5  # of the samples ignored at the left and at the right; chosen: arms, flying pixels
 # Chosen: a camera with more tilt (sine) sees the floor beside the feet, which is as far away as the body, this high.
 LOOKS_DOWN, FEET_M = np.sin(np.radians(10)), 0.3
@@ -57,11 +60,11 @@ class Layer(NamedTuple):
 class RectSamples(object):
     """Samples of the visible part of a rectangle in the level frame, each an element of flat arrays.
 
-    `rays` are the `camera_rays`; `shape` are the numbers of rows and columns, and `measured` is the number of
-    samples with depth and a viewing ray, masked or not.
+    `rays` are the `camera_rays` and `truncated` the `truncated_edges` of the rectangle; `shape` are the numbers of rows
+    and columns, and `measured` is the number of samples with depth and a viewing ray, masked or not.
     """
 
-    def __init__(self, depth, rect_px, rays, level_axes):
+    def __init__(self, depth, rect_px, rays, level_axes, truncated):
         self.rect_px, self._level_axes = rect_px, level_axes
         self._rows, self._columns = grid_in(rect_px, depth.shape)
         x, y = rays
@@ -74,7 +77,8 @@ class RectSamples(object):
         self.measured = int(np.count_nonzero(known))
         self._ahead_mm = (1000 * ahead_m + np.float32(0.5)).astype(np.uint16)
         self._ahead_mm[~known] = UNKNOWN_MM
-        self._column_weights = _column_weights(rect_px, self._columns)
+        self._weights = (_ROW_WEIGHTS[self.shape[0]] * _column_weights(rect_px, self._columns)).ravel()
+        self._outline = _outline(self.shape, truncated)
         self._layer = self._layer_in(self._ahead_mm)
 
     def _along(self, axis):
@@ -83,7 +87,7 @@ class RectSamples(object):
         return ((to_x * x + (to_y * y + to_z)) * self._depth_m).ravel()
 
     def _layer_in(self, ahead_mm):
-        return nearest_dominant_layer(ahead_mm, (_ROW_WEIGHTS[self.shape[0]] * self._column_weights).ravel())
+        return nearest_dominant_layer(ahead_mm, self._weights, self._outline)
 
     def layer(self):
         """Nearest dominant Layer of the samples that are not masked; None if there are none."""
@@ -171,15 +175,27 @@ def _column_weights(rect_px, columns):
     return np.exp(-0.5 * across ** 2)
 
 
-def nearest_dominant_layer(distances_mm, weights):
+@functools.lru_cache(maxsize=512)
+def _outline(shape, truncated):
+    """Numbers of the outermost samples at the left, at the top and at the right, but not where the image border
+    truncates the object. Below it, there is the floor, or what hides the legs."""
+    numbers, (cut_left, cut_top, cut_right, _cut_bottom) = np.arange(shape[0] * shape[1]).reshape(shape), truncated
+    sides = [side for side, is_cut in ((numbers[:, :1], cut_left), (numbers[:1], cut_top), (numbers[:, -1:], cut_right))
+             if not is_cut]
+    return np.concatenate([side.ravel() for side in sides] or [numbers[:0].ravel()])
+
+
+def nearest_dominant_layer(distances_mm, weights, outline=()):
     """The Layer of the object in a rectangle: the nearest dominant one in the weighted histogram of the distances (n,).
 
-    Returns None if no distance is known.
+    What fills the outline of the rectangle, the distances with the numbers `outline`, is behind or beside the object:
+    the weight of each layer is multiplied by the share of the outline that is not in the layer. Returns None if no
+    distance is known.
     """
     nearest_mm = int(distances_mm.min()) if distances_mm.size else UNKNOWN_MM
     if nearest_mm == UNKNOWN_MM:
         return None
-    start_mm = _start_of_layer(distances_mm, weights, nearest_mm)
+    start_mm = _start_of_layer(distances_mm, weights, nearest_mm, outline)
 
     # Counts of distances in millimetres around the layer, instead of sorting. The first and the last count contain all
     # other distances; those in the first one precede all ranks.
@@ -195,19 +211,28 @@ def nearest_dominant_layer(distances_mm, weights):
     return Layer(low_mm + trunk, first, end, low_mm, counts)
 
 
-def _start_of_layer(distances_mm, weights, nearest_mm):
+def _start_of_layer(distances_mm, weights, nearest_mm, outline):
     """Least distance in the nearest dominant layer; it may be less than 0."""
     farthest_mm = int((distances_mm + np.uint16(1)).max()) - 1
     bins = (farthest_mm - nearest_mm) // BIN_MM + 1 + LAYER_BINS
     # Differences are modulo 2 ** 16: unknown distances are in the first bins, or after the last one.
     numbers = (distances_mm - np.uint16((nearest_mm - BIN_MM * _EMPTY_BINS) % 2 ** 16)) // np.uint16(BIN_MM)
-    histogram = np.bincount(numbers, weights, bins)[:bins]
-    histogram[:_EMPTY_BINS] = 0
-    sums = histogram.cumsum()
-    layers = sums[LAYER_BINS:] - sums[:-LAYER_BINS]
+    layers, _total = _layer_sums(numbers, weights, bins)
+    if len(outline) >= LEAST_OUTLINE:
+        around, known = _layer_sums(numbers[outline], None, bins)
+        if known >= LEAST_OUTLINE:
+            layers *= np.maximum(1 - around / known, LEAST_INSIDE)
     first = int((layers >= FIRST_LAYER_SHARE * layers.max()).argmax())
     best = first + int(layers[first:first + LAYER_BINS].argmax())
     return nearest_mm + BIN_MM * (best - LAYER_BINS // 2)
+
+
+def _layer_sums(numbers, weights, bins):
+    """Sums of the weights (None: 1 each) in the layers that begin at each bin, given the numbers of bins; and of all."""
+    histogram = np.bincount(numbers, weights, bins)[:bins]
+    histogram[:_EMPTY_BINS] = 0
+    sums = histogram.cumsum()
+    return sums[LAYER_BINS:] - sums[:-LAYER_BINS], sums[-1]
 
 
 def _median(ranks, low, high):

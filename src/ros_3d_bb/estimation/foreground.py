@@ -21,8 +21,8 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     """Estimate a box from the depth layer of the object in each rectangle of an image: the nearest layer that is
     dominant near the middle of the rectangle.
 
-    Background beside and between the limbs may fill most of a rectangle, but it is farther away. Flying pixels are too
-    sparse to form a layer. The position is that of the vertical axis of the object: laterally halfway between the edges
+    Background beside and between the limbs may fill most of a rectangle, but it is farther away and fills the outline of
+    the rectangle, too. Flying pixels are too sparse to form a layer. The position is that of the vertical axis of the object: laterally halfway between the edges
     of the layer, and behind its mean depth by the distance of its class. If the image border truncates the object, it
     is completed to the usual size of its class. All of this is done in the level frame.
 
@@ -46,7 +46,7 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     with np.errstate(invalid='ignore'):  # nan: the distortion model has no ray for every pixel
         for number, rect_px in enumerate(rects_px):
             truncated.append(truncated_edges(rect_px, geometry.area_px))
-            samples.append(RectSamples(depth, rect_px, rays, geometry.level_axes))
+            samples.append(RectSamples(depth, rect_px, rays, geometry.level_axes, truncated[number]))
             rows, columns = samples[number].shape
             has_depth = samples[number].measured >= max(LEAST_MEASURED * rows * columns, 1)
             if has_depth and math.isfinite(sum(flat_px[number])):
