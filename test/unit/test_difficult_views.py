@@ -1,19 +1,22 @@
 """Positions where cameras are tilted, people overlap, or the image border truncates them, on simulated scenes."""
+import os
+
 import numpy as np
 import pytest
 
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.box3d import LEVEL
+from ros_3d_bb.estimation.box3d import LEVEL, plausible
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import CameraView, detections_from_boxes
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL
-from ros_3d_bb_lab.simulation.scenario import scenario_from
+from ros_3d_bb_lab.simulation.scenario import read_scenario, scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
 
+SCENARIOS = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'scenarios')
 SCATTER = 0.015  # standard deviation of the edges of detected boxes, relative to the box
 CHI_SQUARE_95 = 5.991  # 2 degrees of freedom
 
@@ -93,6 +96,21 @@ def depths_m(simulator):
     frame = simulator.frame(0)
     return [transform_points(np.linalg.inv(frame.poses.map_from_camera), person.position_m)[2]
             for person in frame.people]
+
+
+@pytest.mark.parametrize('nearest_mm', [500, 700])
+@pytest.mark.parametrize('name', ['high_mount', 'jackal', 'child', 'tall'])
+def test_a_person_too_near_for_the_depth_camera_is_not_the_wall(name, nearest_mm):
+    simulator = Simulator(read_scenario(os.path.join(SCENARIOS, 'approach_%s.yaml' % name)))
+    too_near = 0
+    for number in range(90, 180, 15):
+        frame = simulator.frame(number)
+        depth = DepthImage(np.where(frame.depth_mm < nearest_mm, 0, frame.depth_mm).astype(np.uint16), 0.001)
+        box, = estimate_boxes(depth, [tuple(frame.people[0].box_px)], simulator.camera, estimator_named('foreground'))
+        true_m = transform_points(np.linalg.inv(frame.poses.map_from_camera), frame.people[0].position_m)[2]
+        too_near += true_m < nearest_mm / 1000.0
+        assert plausible(box) is None or abs(box.center_m[2] - true_m) < 0.5
+    assert too_near
 
 
 @pytest.mark.parametrize('height_m', [0.27, 1.2])

@@ -116,6 +116,10 @@ class RectSamples(object):
         nearest_mm = max(layer.trunk_mm - BODY_HALF_DEPTH_MM, 0)
         return self._ahead_mm - np.uint16(nearest_mm) <= layer.trunk_mm + BODY_HALF_DEPTH_MM - nearest_mm
 
+    def share(self, on_body):
+        """Share of the weight of all samples, with depth or not, that the given samples have."""
+        return self._weights.dot(on_body) / self._weights.sum()
+
     def edges(self, on_body, lowest_m=None):
         """Left and right edge of the body whose samples are given, metres; those above `lowest_m`, if there are any."""
         if lowest_m is not None:
@@ -228,7 +232,8 @@ def _start_of_layer(distances_mm, weights, nearest_mm, outline):
 
 
 def _layer_sums(numbers, weights, bins):
-    """Sums of the weights (None: 1 each) in the layers that begin at each bin, given the numbers of bins; and of all."""
+    """Sums of the weights (None: 1 each) in the layers that begin at each bin, given the bins of samples; and of all.
+    """
     histogram = np.bincount(numbers, weights, bins)[:bins]
     histogram[:_EMPTY_BINS] = 0
     sums = histogram.cumsum()
