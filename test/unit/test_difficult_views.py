@@ -182,6 +182,18 @@ def test_a_person_behind_a_table_below_a_tilted_camera_in_a_loose_box(ahead_m, w
         assert plane_errors_m([(frame.people[0], box, camera_from_map)])[0] < 0.3
 
 
+@pytest.mark.parametrize('start_m,facing,height_m,chest_at_m,chest_m,behind_m', [
+    ([3.259, 0.536], 1.4, 1.2, [2.38, 0.262], [0.3, 0.372, 0.579], 2.5),
+    ([4.261, 0.354], 2.1, 1.75, [3.768, 0.155], [0.3, 0.292, 0.763], 1.2),
+    ([4.261, 0.354], 1.4, 1.75, [3.768, 0.155], [0.3, 0.292, 0.763], 1.2)])
+def test_a_person_who_crouches_behind_a_chest(start_m, facing, height_m, chest_at_m, chest_m, behind_m):
+    person = {'start': start_m, 'facing': facing, 'height': height_m, 'crouch': 0.7}
+    simulator = simulator_of([person], 0.9, furniture=[{'at': chest_at_m, 'size': chest_m}],
+                             wall_m=start_m[0] + behind_m)
+    box, = level_boxes(simulator, [simulator.frame(0).people[0].box_px])
+    assert box.center_m[2] == pytest.approx(depths_m(simulator)[0], abs=0.3)
+
+
 def test_heights_below_a_tilted_camera():
     scenes = [simulator_of([{'start': [3.4, 0.4 * side], 'facing': 3.0, 'height': 1.75}], 2.35, 28, seed=seed)
               for seed, side in enumerate((-2, -1, 0, 1, 2))]

@@ -27,7 +27,7 @@ BIN_MM, LAYER_BINS = 50, 5  # of the depth histogram; chosen: a layer is as thic
 FIRST_LAYER_SHARE = 0.5
 # Chosen: with fewer samples of the outline, it is not known what surrounds the object. What fills the outline keeps
 # this share of its weight, because a rectangle may be smaller than its object.
-LEAST_OUTLINE, LEAST_INSIDE = 10, 0.1
+LEAST_OUTLINE, LEAST_INSIDE = 10, 0.3
 EDGE_PERCENT = 5  # of the samples ignored at the left and at the right; chosen: arms, flying pixels
 # Chosen: a camera with more tilt (sine) sees the floor beside the feet, which is as far away as the body, this high.
 LOOKS_DOWN, FEET_M = np.sin(np.radians(10)), 0.3
@@ -60,11 +60,12 @@ class Layer(NamedTuple):
 class RectSamples(object):
     """Samples of the visible part of a rectangle in the level frame, each an element of flat arrays.
 
-    `rays` are the `camera_rays` and `truncated` the `truncated_edges` of the rectangle; `shape` are the numbers of rows
-    and columns, and `measured` is the number of samples with depth and a viewing ray, masked or not.
+    `rays` are the `camera_rays`; `surrounded` states whether the left, the upper and the right edge show what surrounds
+    the object. `shape` are the numbers of rows and columns, and `measured` is the number of samples with depth and a
+    viewing ray, masked or not.
     """
 
-    def __init__(self, depth, rect_px, rays, level_axes, truncated):
+    def __init__(self, depth, rect_px, rays, level_axes, surrounded):
         self.rect_px, self._level_axes = rect_px, level_axes
         self._rows, self._columns = grid_in(rect_px, depth.shape)
         x, y = rays
@@ -78,7 +79,7 @@ class RectSamples(object):
         self._ahead_mm = (1000 * ahead_m + np.float32(0.5)).astype(np.uint16)
         self._ahead_mm[~known] = UNKNOWN_MM
         self._weights = (_ROW_WEIGHTS[self.shape[0]] * _column_weights(rect_px, self._columns)).ravel()
-        self._outline = _outline(self.shape, truncated)
+        self._outline = _outline(self.shape, surrounded)
         self._layer = self._layer_in(self._ahead_mm)
 
     def _along(self, axis):
@@ -180,21 +181,19 @@ def _column_weights(rect_px, columns):
 
 
 @functools.lru_cache(maxsize=512)
-def _outline(shape, truncated):
-    """Numbers of the outermost samples at the left, at the top and at the right, but not where the image border
-    truncates the object. Below it, there is the floor, or what hides the legs."""
-    numbers, (cut_left, cut_top, cut_right, _cut_bottom) = np.arange(shape[0] * shape[1]).reshape(shape), truncated
-    sides = [side for side, is_cut in ((numbers[:, :1], cut_left), (numbers[:1], cut_top), (numbers[:, -1:], cut_right))
-             if not is_cut]
-    return np.concatenate([side.ravel() for side in sides] or [numbers[:0].ravel()])
+def _outline(shape, surrounded):
+    """Numbers of the outermost samples at those of the left, the upper and the right edge that are `surrounded`."""
+    numbers = np.arange(shape[0] * shape[1]).reshape(shape)
+    edges_shown = [edge for edge, is_shown in zip((numbers[:, :1], numbers[:1], numbers[:, -1:]), surrounded) if is_shown]
+    return np.concatenate([edge.ravel() for edge in edges_shown] or [numbers[:0].ravel()])
 
 
 def nearest_dominant_layer(distances_mm, weights, outline=()):
     """The Layer of the object in a rectangle: the nearest dominant one in the weighted histogram of the distances (n,).
 
-    What fills the outline of the rectangle, the distances with the numbers `outline`, is behind or beside the object:
-    the weight of each layer is multiplied by the share of the outline that is not in the layer. Returns None if no
-    distance is known.
+    What fills the outline of the rectangle, the distances with the numbers `outline`, surrounds the object: the weight
+    that a layer would have if all distances were like those of the outline is subtracted from its own, up to
+    1 - `LEAST_INSIDE` of it. Returns None if no distance is known.
     """
     nearest_mm = int(distances_mm.min()) if distances_mm.size else UNKNOWN_MM
     if nearest_mm == UNKNOWN_MM:
@@ -221,11 +220,11 @@ def _start_of_layer(distances_mm, weights, nearest_mm, outline):
     bins = (farthest_mm - nearest_mm) // BIN_MM + 1 + LAYER_BINS
     # Differences are modulo 2 ** 16: unknown distances are in the first bins, or after the last one.
     numbers = (distances_mm - np.uint16((nearest_mm - BIN_MM * _EMPTY_BINS) % 2 ** 16)) // np.uint16(BIN_MM)
-    layers, _total = _layer_sums(numbers, weights, bins)
+    layers, total = _layer_sums(numbers, weights, bins)
     if len(outline) >= LEAST_OUTLINE:
         around, known = _layer_sums(numbers[outline], None, bins)
         if known >= LEAST_OUTLINE:
-            layers *= np.maximum(1 - around / known, LEAST_INSIDE)
+            layers = np.maximum(layers - around * (total / known), LEAST_INSIDE * layers)
     first = int((layers >= FIRST_LAYER_SHARE * layers.max()).argmax())
     best = first + int(layers[first:first + LAYER_BINS].argmax())
     return nearest_mm + BIN_MM * (best - LAYER_BINS // 2)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ros_3d_bb.core.labels import PERSON
 from ros_3d_bb.estimation.box3d import (Box3D, complete_truncated_extent, slopes_down, truncated_edges,
                                         without_distortion)
 from ros_3d_bb.estimation.depth_samples import BODY_HALF_DEPTH_MM, FEET_M, LOOKS_DOWN, RectSamples, camera_rays
@@ -24,11 +25,11 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     """Estimate a box from the depth layer of the object in each rectangle of an image: the nearest layer that is
     dominant near the middle of the rectangle.
 
-    Background beside and between the limbs may fill most of a rectangle, but it is farther away, and fills the outline
-    of the rectangle, too. Flying pixels are too sparse to form a layer. The position is that of the vertical axis of
-    the object: laterally halfway between the edges of the layer, and behind its mean depth by the distance of its
-    class. If the image border truncates the object, it is completed to the usual size of its class. All of this is done
-    in the level frame.
+    Background beside and between the limbs may fill most of a rectangle, but it is farther away. Around a person it fills
+    the outline of the rectangle, too, as furniture and other people at the sides do. Flying pixels are too sparse to
+    form a layer. The position is that of the vertical axis of the object: laterally halfway between the edges of the
+    layer, and behind its mean depth by the distance of its class. If the image border truncates the object, it is
+    completed to the usual size of its class. All of this is done in the level frame.
 
     In the rectangles of nearer objects with plausible boxes, pixels that are not behind them are masked. Rectangles are
     therefore estimated in groups, each after those in front of it. Of several rectangles of one object, only the
@@ -50,7 +51,8 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     with np.errstate(invalid='ignore'):  # nan: the distortion model has no ray for every pixel
         for number, rect_px in enumerate(rects_px):
             truncated.append(truncated_edges(rect_px, geometry.area_px))
-            samples.append(RectSamples(depth, rect_px, rays, geometry.level_axes, truncated[number]))
+            surrounded = _surrounded(kinds[number], truncated[number])
+            samples.append(RectSamples(depth, rect_px, rays, geometry.level_axes, surrounded))
             rows, columns = samples[number].shape
             has_depth = samples[number].measured >= max(LEAST_MEASURED * rows * columns, 1)
             if has_depth and math.isfinite(sum(flat_px[number])):
@@ -66,6 +68,14 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
                 overlaps.mask_behind(number, int(1000 * axis_m) + BODY_HALF_DEPTH_MM)
             boxes[number] = box
     return boxes
+
+
+def _surrounded(kind, truncated):
+    """Whether the left, the upper and the right edge of a rectangle show mainly what surrounds the object: not where the
+    image border truncates it, and not those of an ObjectClass that may be as rectangular as a chair. Below people is
+    the floor, or what hides their legs.
+    """
+    return tuple([kind.group == PERSON and not is_cut for is_cut in truncated[:3]])
 
 
 def _visible_extents(samples, flat_px, geometry, may_repeat):

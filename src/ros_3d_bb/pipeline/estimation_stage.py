@@ -121,7 +121,7 @@ class EstimationStage(object):
         factor = self._scale_check.factor(boxes3d)
         if factor is not None:
             self._events.warn('depth of a wrong scale', 'people of impossible height: depth must be multiplied by %g; '
-                              'set ~depth_scale: %g (now %g); positions and sizes are wrong until then'
+                              'set ~depth_scale: %g (now %g); 3D boxes are wrong or missing until then'
                               % (factor, factor * unit_m, unit_m))
 
     def _usable_boxes(self, boxes2d):
