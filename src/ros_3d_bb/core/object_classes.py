@@ -34,7 +34,7 @@ class ObjectClass(NamedTuple):
 
     @property
     def largest_m(self):
-        """Upper bound of the width and the height of an object, metres: of people, by their usual height if it is known."""
+        """Upper bound of width and height, metres; that of people follows from their usual height."""
         return TALLEST_PERSON * self.height if self.group == PERSON and self.height else MAX_SIZE_M
 
     def axis_behind(self, seen_m):

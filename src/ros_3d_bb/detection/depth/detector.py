@@ -143,7 +143,8 @@ def _completed(person, people, camera, floor):
 
 def _hides_legs(other, person):
     """Whether a nearer person is in front of most of the lower edge of a person's box."""
-    (x1, _y1, x2, y2), (left, top, right, bottom) = person.box, other.box
+    x1, _top, x2, y2 = person.box
+    left, top, right, bottom = other.box
     in_front = other.position_m[1] < person.position_m[1] - NEARER_M and top < y2 < bottom
     return in_front and min(x2, right) - max(x1, left) > HIDDEN_SHARE * (x2 - x1)
 
