@@ -1,19 +1,22 @@
 """Positions where cameras are tilted, people overlap, or the image border truncates them, on simulated scenes."""
+import os
+
 import numpy as np
 import pytest
 
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.box3d import LEVEL
+from ros_3d_bb.estimation.box3d import LEVEL, plausible
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import CameraView, detections_from_boxes
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL
-from ros_3d_bb_lab.simulation.scenario import scenario_from
+from ros_3d_bb_lab.simulation.scenario import read_scenario, scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
 
+SCENARIOS = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'scenarios')
 SCATTER = 0.015  # standard deviation of the edges of detected boxes, relative to the box
 CHI_SQUARE_95 = 5.991  # 2 degrees of freedom
 
@@ -95,6 +98,21 @@ def depths_m(simulator):
             for person in frame.people]
 
 
+@pytest.mark.parametrize('nearest_mm', [500, 700])
+@pytest.mark.parametrize('name', ['high_mount', 'jackal', 'child', 'tall'])
+def test_a_person_too_near_for_the_depth_camera_is_not_the_wall(name, nearest_mm):
+    simulator = Simulator(read_scenario(os.path.join(SCENARIOS, 'approach_%s.yaml' % name)))
+    too_near = 0
+    for number in range(90, 180, 15):
+        frame = simulator.frame(number)
+        depth = DepthImage(np.where(frame.depth_mm < nearest_mm, 0, frame.depth_mm).astype(np.uint16), 0.001)
+        box, = estimate_boxes(depth, [tuple(frame.people[0].box_px)], simulator.camera, estimator_named('foreground'))
+        true_m = transform_points(np.linalg.inv(frame.poses.map_from_camera), frame.people[0].position_m)[2]
+        too_near += true_m < nearest_mm / 1000.0
+        assert plausible(box) is None or abs(box.center_m[2] - true_m) < 0.5
+    assert too_near
+
+
 @pytest.mark.parametrize('height_m', [0.27, 1.2])
 @pytest.mark.parametrize('ahead_m', [2.0, 3.0, 4.0])
 @pytest.mark.parametrize('wider,lower_edge', [(0, 1), (0, 0.5), (0.15, 1)], ids=['same', 'upper half', 'wider'])
@@ -144,6 +162,36 @@ def test_a_person_on_a_couch(height_m, ahead_m):
     alone, = level_boxes(simulator, rects_px[:1], ['person'])
     person, _couch = level_boxes(simulator, rects_px, ['person', 'couch'])
     assert person.center_m == pytest.approx(alone.center_m, abs=0.1)
+
+
+@pytest.mark.parametrize('ahead_m,wall_m', [(2.4, 4.0), (3.0, 6.0)])
+def test_a_person_behind_a_table_below_a_tilted_camera_in_a_loose_box(ahead_m, wall_m):
+    """The wall is one compact layer because the tilt is known, and larger than the person in a loose box."""
+    furniture = [{'at': [ahead_m - 0.6, 0.4], 'size': [0.7, 1.4, 0.74]},
+                 {'at': [ahead_m + 0.33, 0.4], 'size': [0.06, 0.45, 0.95]}]
+    simulator = simulator_of([{'start': [ahead_m, 0.4], 'facing': 3.0, 'height': 1.7, 'crouch': 0.6}], 2.35, 28,
+                             furniture=furniture, wall_m=wall_m)
+    frame, random = simulator.frame(0), np.random.RandomState(2)
+    camera_from_map = np.linalg.inv(frame.poses.map_from_camera)
+    tight_px = np.array(frame.people[0].box_px)
+    extents_px = np.tile(tight_px[2:] - tight_px[:2], 2)
+    for _draw in range(20):
+        rect_px = np.clip(tight_px + random.uniform(0, 0.6, 4) * extents_px * [-1, -1, 1, 1], 0, [640, 480] * 2)
+        box, = estimate_boxes(DepthImage(frame.depth_mm, 0.001), [tuple(map(int, rect_px))], simulator.camera,
+                              estimator_named('foreground'), level_from_camera=level_rotation(camera_from_map[:3, 2]))
+        assert plane_errors_m([(frame.people[0], box, camera_from_map)])[0] < 0.3
+
+
+@pytest.mark.parametrize('start_m,facing,height_m,chest_at_m,chest_m,behind_m', [
+    ([3.259, 0.536], 1.4, 1.2, [2.38, 0.262], [0.3, 0.372, 0.579], 2.5),
+    ([4.261, 0.354], 2.1, 1.75, [3.768, 0.155], [0.3, 0.292, 0.763], 1.2),
+    ([4.261, 0.354], 1.4, 1.75, [3.768, 0.155], [0.3, 0.292, 0.763], 1.2)])
+def test_a_person_who_crouches_behind_a_chest(start_m, facing, height_m, chest_at_m, chest_m, behind_m):
+    person = {'start': start_m, 'facing': facing, 'height': height_m, 'crouch': 0.7}
+    simulator = simulator_of([person], 0.9, furniture=[{'at': chest_at_m, 'size': chest_m}],
+                             wall_m=start_m[0] + behind_m)
+    box, = level_boxes(simulator, [simulator.frame(0).people[0].box_px])
+    assert box.center_m[2] == pytest.approx(depths_m(simulator)[0], abs=0.3)
 
 
 def test_heights_below_a_tilted_camera():

@@ -12,6 +12,7 @@ from ros_3d_bb.core.yaml_loader import load_yaml
 
 MAX_CLASSES, MAX_IN_GROUP = 200, 8
 LARGEST_FACTOR = 100.0
+TALLEST_PERSON = 1.6  # relative to the usual height; chosen: a tall person with raised arms
 
 
 class ObjectClass(NamedTuple):
@@ -30,6 +31,11 @@ class ObjectClass(NamedTuple):
     axis: Optional[float] = None
     acceleration: float = 1.0
     initial_speed: float = 1.0
+
+    @property
+    def largest_m(self):
+        """Upper bound of the width and the height of an object, metres: of people, by their usual height if it is known."""
+        return TALLEST_PERSON * self.height if self.group == PERSON and self.height else MAX_SIZE_M
 
     def axis_behind(self, seen_m):
         """Distance from the visible surface to the vertical axis of an object that appears `seen_m` wide.

@@ -38,7 +38,7 @@ class Box3D(NamedTuple):
     source rectangle; `support` is the share 0..1 of the samples with depth that belong to its depth layer;
     `truncated_edges` states whether the left, upper, right and lower edge of the rectangle touch the image border;
     `covariance_m2` (3, 3) is that of the centre, None if unknown; `label` is the class name, and `score` is that of the
-    rectangle, 0..1, 0 if unknown.
+    rectangle, 0..1, 0 if unknown; `largest_m` is the upper bound of width and height.
     """
 
     center_m: np.ndarray
@@ -49,6 +49,7 @@ class Box3D(NamedTuple):
     covariance_m2: Optional[Any] = None
     label: str = PERSON
     score: float = 0.0
+    largest_m: float = MAX_SIZE_M
 
     @property
     def truncated(self):
@@ -57,10 +58,10 @@ class Box3D(NamedTuple):
 
     @property
     def is_plausible(self):
-        """Whether the centre is nearer than `MAX_COORDINATE_M`, and width and height are between 0 and `MAX_SIZE_M`."""
+        """Whether the centre is nearer than `MAX_COORDINATE_M`, and width and height are between 0 and `largest_m`."""
         x_m, y_m, z_m = self.center_m.tolist()
         width_m, height_m, _width_m = self.size_m.tolist()
-        return (0 < width_m < MAX_SIZE_M and 0 < height_m < MAX_SIZE_M
+        return (0 < width_m < self.largest_m and 0 < height_m < self.largest_m
                 and abs(x_m) < MAX_COORDINATE_M and abs(y_m) < MAX_COORDINATE_M and abs(z_m) < MAX_COORDINATE_M)
 
 

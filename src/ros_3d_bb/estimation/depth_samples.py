@@ -18,6 +18,7 @@ GRID_ROWS, GRID_COLUMNS = 48, 32
 # The lower part of a rectangle, where something may stand before the legs, has less weight. Chosen so that no person
 # behind the dog of config/scenarios/objects.yaml is taken for the dog.
 UPPER_SHARE, LOWER_WEIGHT = 0.55, 0.35
+NEAREST_LAYER_M = 0.001  # nearer distances are 0 in whole millimetres
 UNKNOWN_MM, FARTHEST_LAYER_M = 65535, 65.0  # chosen: 16 bits hold the farthest layer and half a body behind it
 # Half the depth extents of a person with stretched arms, and of the trunk. Chosen: points farther from the trunk are
 # not part of the person, and a wall close behind must not shift the median.
@@ -25,6 +26,9 @@ BODY_HALF_DEPTH_MM, TRUNK_HALF_DEPTH_MM = 350, 250
 BIN_MM, LAYER_BINS = 50, 5  # of the depth histogram; chosen: a layer is as thick as a trunk
 # The nearest layer with at least this share of the largest layer weight is the person. Chosen: flying pixels have less.
 FIRST_LAYER_SHARE = 0.5
+# Chosen: with fewer samples of the outline, it is not known what surrounds the object. What fills the outline keeps
+# this share of its weight, because a rectangle may be smaller than its object.
+LEAST_OUTLINE, LEAST_INSIDE = 10, 0.3
 EDGE_PERCENT = 5  # of the samples ignored at the left and at the right; chosen: arms, flying pixels
 # Chosen: a camera with more tilt (sine) sees the floor beside the feet, which is as far away as the body, this high.
 LOOKS_DOWN, FEET_M = np.sin(np.radians(10)), 0.3
@@ -57,11 +61,12 @@ class Layer(NamedTuple):
 class RectSamples(object):
     """Samples of the visible part of a rectangle in the level frame, each an element of flat arrays.
 
-    `rays` are the `camera_rays`; `shape` are the numbers of rows and columns, and `measured` is the number of
-    samples with depth and a viewing ray, masked or not.
+    `rays` are the `camera_rays`; `surrounded` states whether the left, the upper and the right edge show what surrounds
+    the object. `shape` are the numbers of rows and columns, and `measured` is the number of samples with depth and a
+    viewing ray, masked or not.
     """
 
-    def __init__(self, depth, rect_px, rays, level_axes):
+    def __init__(self, depth, rect_px, rays, level_axes, surrounded):
         self.rect_px, self._level_axes = rect_px, level_axes
         self._rows, self._columns = grid_in(rect_px, depth.shape)
         x, y = rays
@@ -70,11 +75,12 @@ class RectSamples(object):
         self._depth_m = _depths(depth.part(self._rows, self._columns), depth.scale_m)
         self.shape = self._depth_m.shape
         ahead_m = self._along(2)
-        known = (ahead_m > 0) & (ahead_m <= FARTHEST_LAYER_M)
+        known = (ahead_m >= NEAREST_LAYER_M) & (ahead_m <= FARTHEST_LAYER_M)
         self.measured = int(np.count_nonzero(known))
         self._ahead_mm = (1000 * ahead_m + np.float32(0.5)).astype(np.uint16)
         self._ahead_mm[~known] = UNKNOWN_MM
-        self._column_weights = _column_weights(rect_px, self._columns)
+        self._weights = (_ROW_WEIGHTS[self.shape[0]] * _column_weights(rect_px, self._columns)).ravel()
+        self._outline = _outline(self.shape, surrounded)
         self._layer = self._layer_in(self._ahead_mm)
 
     def _along(self, axis):
@@ -83,7 +89,7 @@ class RectSamples(object):
         return ((to_x * x + (to_y * y + to_z)) * self._depth_m).ravel()
 
     def _layer_in(self, ahead_mm):
-        return nearest_dominant_layer(ahead_mm, (_ROW_WEIGHTS[self.shape[0]] * self._column_weights).ravel())
+        return nearest_dominant_layer(ahead_mm, self._weights, self._outline)
 
     def layer(self):
         """Nearest dominant Layer of the samples that are not masked; None if there are none."""
@@ -111,6 +117,10 @@ class RectSamples(object):
         """Which samples are on the body of a Layer."""
         nearest_mm = max(layer.trunk_mm - BODY_HALF_DEPTH_MM, 0)
         return self._ahead_mm - np.uint16(nearest_mm) <= layer.trunk_mm + BODY_HALF_DEPTH_MM - nearest_mm
+
+    def share(self, on_body):
+        """Share of the weight of all samples, with depth or not, that the given samples have."""
+        return self._weights.dot(on_body) / self._weights.sum()
 
     def edges(self, on_body, lowest_m=None):
         """Left and right edge of the body whose samples are given, metres; those above `lowest_m`, if there are any."""
@@ -171,15 +181,25 @@ def _column_weights(rect_px, columns):
     return np.exp(-0.5 * across ** 2)
 
 
-def nearest_dominant_layer(distances_mm, weights):
+@functools.lru_cache(maxsize=512)
+def _outline(shape, surrounded):
+    """Numbers of the outermost samples at those of the left, the upper and the right edge that are `surrounded`."""
+    numbers = np.arange(shape[0] * shape[1]).reshape(shape)
+    edges_shown = [edge for edge, is_shown in zip((numbers[:, :1], numbers[:1], numbers[:, -1:]), surrounded) if is_shown]
+    return np.concatenate([edge.ravel() for edge in edges_shown] or [numbers[:0].ravel()])
+
+
+def nearest_dominant_layer(distances_mm, weights, outline=()):
     """The Layer of the object in a rectangle: the nearest dominant one in the weighted histogram of the distances (n,).
 
-    Returns None if no distance is known.
+    What fills the outline of the rectangle, the distances with the numbers `outline`, surrounds the object: the weight
+    that a layer would have if all distances were like those of the outline is subtracted from its own, up to
+    1 - `LEAST_INSIDE` of it. Returns None if no distance is known.
     """
     nearest_mm = int(distances_mm.min()) if distances_mm.size else UNKNOWN_MM
     if nearest_mm == UNKNOWN_MM:
         return None
-    start_mm = _start_of_layer(distances_mm, weights, nearest_mm)
+    start_mm = _start_of_layer(distances_mm, weights, nearest_mm, outline)
 
     # Counts of distances in millimetres around the layer, instead of sorting. The first and the last count contain all
     # other distances; those in the first one precede all ranks.
@@ -195,19 +215,29 @@ def nearest_dominant_layer(distances_mm, weights):
     return Layer(low_mm + trunk, first, end, low_mm, counts)
 
 
-def _start_of_layer(distances_mm, weights, nearest_mm):
+def _start_of_layer(distances_mm, weights, nearest_mm, outline):
     """Least distance in the nearest dominant layer; it may be less than 0."""
     farthest_mm = int((distances_mm + np.uint16(1)).max()) - 1
     bins = (farthest_mm - nearest_mm) // BIN_MM + 1 + LAYER_BINS
     # Differences are modulo 2 ** 16: unknown distances are in the first bins, or after the last one.
     numbers = (distances_mm - np.uint16((nearest_mm - BIN_MM * _EMPTY_BINS) % 2 ** 16)) // np.uint16(BIN_MM)
-    histogram = np.bincount(numbers, weights, bins)[:bins]
-    histogram[:_EMPTY_BINS] = 0
-    sums = histogram.cumsum()
-    layers = sums[LAYER_BINS:] - sums[:-LAYER_BINS]
+    layers, total = _layer_sums(numbers, weights, bins)
+    if len(outline) >= LEAST_OUTLINE:
+        around, known = _layer_sums(numbers[outline], None, bins)
+        if known >= LEAST_OUTLINE:
+            layers = np.maximum(layers - around * (total / known), LEAST_INSIDE * layers)
     first = int((layers >= FIRST_LAYER_SHARE * layers.max()).argmax())
     best = first + int(layers[first:first + LAYER_BINS].argmax())
     return nearest_mm + BIN_MM * (best - LAYER_BINS // 2)
+
+
+def _layer_sums(numbers, weights, bins):
+    """Sums of the weights (None: 1 each) in the layers that begin at each bin, given the bins of samples; and of all.
+    """
+    histogram = np.bincount(numbers, weights, bins)[:bins]
+    histogram[:_EMPTY_BINS] = 0
+    sums = histogram.cumsum()
+    return sums[LAYER_BINS:] - sums[:-LAYER_BINS], sums[-1]
 
 
 def _median(ranks, low, high):

@@ -6,12 +6,16 @@ import math
 
 import numpy as np
 
+from ros_3d_bb.core.labels import PERSON
 from ros_3d_bb.estimation.box3d import (Box3D, complete_truncated_extent, slopes_down, truncated_edges,
                                         without_distortion)
 from ros_3d_bb.estimation.depth_samples import BODY_HALF_DEPTH_MM, FEET_M, LOOKS_DOWN, RectSamples, camera_rays
 from ros_3d_bb.estimation.overlaps import Overlaps
 
 LEAST_MEASURED = 0.02  # minimum share of the samples with depth for an estimate; chosen: a lidar gives twice as many
+# Minimum share of the weight of all samples in the layer for an estimate. Chosen: what a depth camera measures beside a
+# person who is too near for it has at most 0.014 in the approach scenes.
+LEAST_SHARE = 0.02
 LEAST_SUPPORT = 0.1  # minimum share of the samples with depth in the layer for an estimate; chosen
 LEAST_WIDTH_M = 0.05  # chosen: of a body that is one pixel wide
 FILLED = 0.4  # minimum share of both sides of a rectangle that background behind an object fills; chosen
@@ -21,10 +25,11 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     """Estimate a box from the depth layer of the object in each rectangle of an image: the nearest layer that is
     dominant near the middle of the rectangle.
 
-    Background beside and between the limbs may fill most of a rectangle, but it is farther away. Flying pixels are too
-    sparse to form a layer. The position is that of the vertical axis of the object: laterally halfway between the edges
-    of the layer, and behind its mean depth by the distance of its class. If the image border truncates the object, it
-    is completed to the usual size of its class. All of this is done in the level frame.
+    Background beside and between the limbs may fill most of a rectangle, but it is farther away. Around a person it fills
+    the outline of the rectangle, too, as furniture and other people at the sides do. Flying pixels are too sparse to
+    form a layer. The position is that of the vertical axis of the object: laterally halfway between the edges of the
+    layer, and behind its mean depth by the distance of its class. If the image border truncates the object, it is
+    completed to the usual size of its class. All of this is done in the level frame.
 
     In the rectangles of nearer objects with plausible boxes, pixels that are not behind them are masked. Rectangles are
     therefore estimated in groups, each after those in front of it. Of several rectangles of one object, only the
@@ -36,8 +41,8 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     -------
     list of Box3D or None
         None if less than `LEAST_MEASURED` of the samples have a valid depth and a viewing ray, if the layer contains
-        less than `LEAST_SUPPORT` of those with depth, if the rectangle cannot be undistorted, or if it is a second one
-        of the same object.
+        less than `LEAST_SUPPORT` of those with depth, or less than `LEAST_SHARE` of all, weighted, if the rectangle
+        cannot be undistorted, or if it is a second one of the same object.
     """
     rects_px = list(map(tuple, rects_px))
     flat_px = without_distortion(rects_px, geometry.camera)
@@ -46,7 +51,8 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     with np.errstate(invalid='ignore'):  # nan: the distortion model has no ray for every pixel
         for number, rect_px in enumerate(rects_px):
             truncated.append(truncated_edges(rect_px, geometry.area_px))
-            samples.append(RectSamples(depth, rect_px, rays, geometry.level_axes))
+            surrounded = _surrounded(kinds[number], truncated[number])
+            samples.append(RectSamples(depth, rect_px, rays, geometry.level_axes, surrounded))
             rows, columns = samples[number].shape
             has_depth = samples[number].measured >= max(LEAST_MEASURED * rows * columns, 1)
             if has_depth and math.isfinite(sum(flat_px[number])):
@@ -64,6 +70,14 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     return boxes
 
 
+def _surrounded(kind, truncated):
+    """Whether the left, the upper and the right edge of a rectangle show mainly what surrounds the object: not where the
+    image border truncates it, and not those of an ObjectClass that may be as rectangular as a chair. Below people is
+    the floor, or what hides their legs.
+    """
+    return tuple([kind.group == PERSON and not is_cut for is_cut in truncated[:3]])
+
+
 def _visible_extents(samples, flat_px, geometry, may_repeat):
     """Left, right, upper and lower end of the object in a rectangle and its distance, metres, and its support.
 
@@ -75,6 +89,8 @@ def _visible_extents(samples, flat_px, geometry, may_repeat):
     if support < LEAST_SUPPORT:
         return None
     on_body = samples.on_body(layer)
+    if samples.share(on_body) < LEAST_SHARE:
+        return None
     if may_repeat and _fills_sides(on_body.reshape(samples.shape)):
         return None
     # The mean without the nearest and the farthest tenth is finer than the median, which has the depth resolution.
@@ -106,4 +122,4 @@ def _box(seen, rect_px, truncated, kind, geometry):
     across_m, down_m = (left_m + right_m) / 2 * along_ray, (top_m + bottom_m) / 2 * along_ray
     center_m = [x * across_m + y * down_m + z * axis_m for x, y, z in zip(*geometry.level_axes)]
     size_m = np.array((width_m, bottom_m - top_m, width_m))
-    return Box3D(np.array(center_m), size_m, rect_px, support, truncated), axis_m
+    return Box3D(np.array(center_m), size_m, rect_px, support, truncated, largest_m=kind.largest_m), axis_m

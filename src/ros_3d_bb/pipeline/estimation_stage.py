@@ -5,7 +5,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_3d_bb.camera.image_rotation import turned_rotation
-from ros_3d_bb.core.valid_ranges import MAX_SIZE_M
 from ros_3d_bb.core.object_classes import read_object_classes
 from ros_3d_bb.core.params import (CLASSES_FILE, DEPTH, DEPTH_SCALE, IMAGE_ROTATION, LARGEST, STAMP_TOLERANCE, Param,
                                    parameters)
@@ -106,7 +105,7 @@ class EstimationStage(object):
         for box in _as_received(implausible, frame):
             self._events.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and '
                               '%.3g m high at %.3g m; less than %g m expected; the others in this image are used'
-                              % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2], MAX_SIZE_M)))
+                              % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2], box.largest_m)))
         self._check_scale(found, frame.depth_unit_m)
         counts = {'boxes estimated': len(boxes3d), 'boxes without depth': len(estimates) - len(found)}
         boxes3d = corrected_boxes(boxes3d, self._error_model, abs(frame.stamp_ns - frame.depth_stamp_ns) / NS)
@@ -122,7 +121,7 @@ class EstimationStage(object):
         factor = self._scale_check.factor(boxes3d)
         if factor is not None:
             self._events.warn('depth of a wrong scale', 'people of impossible height: depth must be multiplied by %g; '
-                              'set ~depth_scale: %g (now %g); positions and sizes are wrong until then'
+                              'set ~depth_scale: %g (now %g); 3D boxes are wrong or missing until then'
                               % (factor, factor * unit_m, unit_m))
 
     def _usable_boxes(self, boxes2d):

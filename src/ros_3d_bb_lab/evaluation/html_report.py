@@ -14,6 +14,7 @@ td, th {{ padding: 0.15em 0.8em; text-align: right; vertical-align: top; }}
 th {{ border-bottom: 1px solid #888; }} td:first-child, th:first-child {{ text-align: left; padding-left: 0; }}
 .pairs td, .pairs th {{ text-align: left; }}
 img {{ max-width: 100%; }} figure {{ margin: 1.5em 0; }}
+@media (max-width: 600px) {{ td, th {{ padding: 0.15em 0.25em; font-size: 0.85em; }} }}
 figcaption, .caption {{ color: #444; font-size: 0.9em; margin: 0.5em 0 0; }}
 </style></head><body>
 <h1>{title}</h1>
