@@ -23,11 +23,12 @@ CHI_SQUARE_95 = 5.991  # 2 degrees of freedom
 pytestmark = pytest.mark.slow
 
 
-def simulator_of(people, height_m, tilt_deg=0, seconds=0.2, rate=5.0, seed=0, furniture=(), wall_m=14.0):
+def simulator_of(people, height_m, tilt_deg=0, seconds=0.2, rate=5.0, seed=0, furniture=(), wall_m=14.0,
+                 objects=()):
     robot = {'mount': [0.0, 0.0, height_m - 0.065], 'pitch': np.radians(tilt_deg)}
     room = {'bounds': [-4.0, wall_m, -7.0, 7.0], 'height': 4.0, 'furniture': list(furniture)}
     return Simulator(scenario_from({'duration': seconds, 'rate': rate, 'seed': seed, 'robot': robot, 'people': people,
-                                    'room': room}))
+                                    'room': room, 'objects': list(objects)}))
 
 
 def overlapping_people(count, nearest_m, farthest_m, random):
@@ -194,6 +195,42 @@ def test_a_person_who_crouches_behind_a_chest(start_m, facing, height_m, chest_a
     assert box.center_m[2] == pytest.approx(depths_m(simulator)[0], abs=0.3)
 
 
+POSES = {'still': {}, 'left arm out': dict(lift_l=1.57), 'right arm out': dict(lift_r=1.57),
+         'both out': dict(lift_l=1.57, lift_r=1.57), 'left arm up': dict(lift_l=2.9),
+         'both up': dict(lift_l=2.9, lift_r=2.9), 'bent': dict(bend=0.7)}
+
+
+def posed_person(angles, ahead_m, facing, height_m, tilt_deg, objects=()):
+    """Errors of the 3D box of a person in a posture, metres: sideways, and of the height without arms."""
+    simulator = simulator_of([{'start': [ahead_m, 0.2], 'facing': facing, 'height': 1.7}], height_m, tilt_deg,
+                             objects=objects, wall_m=6.0)
+    state = simulator.state_at(0)
+    person, = state.people
+    posture = person.posture._replace(**angles)
+    frame = simulator.frame(0, state._replace(people=[person._replace(posture=posture)]))
+    camera_from_map = np.linalg.inv(frame.poses.map_from_camera)
+    box, = estimate_boxes(DepthImage(frame.depth_mm, 0.001), [frame.people[0].box_px], simulator.camera,
+                          estimator_named('foreground'), level_from_camera=level_rotation(camera_from_map[:3, 2]))
+    without_arms = simulator.bodies[0].posed(posture._replace(lift_l=0, lift_r=0, reach=0))
+    aside_m = transform_points(np.linalg.inv(camera_from_map), box.center_m)[1] - frame.people[0].position_m[1]
+    return aside_m, box.size_m[1] - without_arms.vertices[:, 2].max()
+
+
+@pytest.mark.parametrize('facing', [3.14, 2.2, 1.57])
+@pytest.mark.parametrize('ahead_m,height_m,tilt_deg,spread_m', [(4.2, 0.9, 0, 0.09), (3.4, 2.35, 28, 0.12)])
+def test_arms_and_bending_do_not_move_the_axis_or_change_the_height(ahead_m, height_m, tilt_deg, spread_m, facing):
+    aside_m, higher_m = np.transpose([posed_person(angles, ahead_m, facing, height_m, tilt_deg)
+                                      for angles in POSES.values()])
+    assert np.abs(aside_m).max() < 0.08 and np.ptp(higher_m) < spread_m and np.abs(higher_m).max() < 0.14
+
+
+@pytest.mark.parametrize('facing', [3.14, 2.2, 1.57])
+def test_a_person_who_carries_a_box(facing):
+    parcel = {'label': 'parcel', 'start': [4.2 + 0.35 * np.cos(facing), 0.2 + 0.35 * np.sin(facing)], 'facing': facing,
+              'size': [0.3, 0.4, 0.3], 'above': 0.9}
+    assert abs(posed_person({'reach': 0.9}, 4.2, facing, 0.9, 0, [parcel])[0]) < 0.08
+
+
 def test_heights_below_a_tilted_camera():
     scenes = [simulator_of([{'start': [3.4, 0.4 * side], 'facing': 3.0, 'height': 1.75}], 2.35, 28, seed=seed)
               for seed, side in enumerate((-2, -1, 0, 1, 2))]
@@ -219,7 +256,7 @@ def test_covariances_hold_for_any_support():
         supports.append(box.support)
     third = np.digitize(supports, np.percentile(supports, [100 / 3, 200 / 3]))
     coverage = [np.mean(np.array(distances)[third == number] < CHI_SQUARE_95) for number in range(3)]
-    assert all(0.88 <= share < 1 for share in coverage), coverage
+    assert all(0.88 <= share for share in coverage) and np.mean(coverage) < 0.99, coverage
 
 
 def test_a_person_cut_at_the_hips_is_one_track_of_one_height():

@@ -3,6 +3,7 @@
 The order of the objects and their masks are in `overlaps`, the layers in `depth_samples`.
 """
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,10 @@ LEAST_MEASURED = 0.02  # minimum share of the samples with depth for an estimate
 # person who is too near for it has at most 0.014 in the approach scenes.
 LEAST_SHARE = 0.02
 LEAST_SUPPORT = 0.1  # minimum share of the samples with depth in the layer for an estimate; chosen
+# Chosen: the axis of a person is at most this far from the middle of the trunk. With less, the errors in the thesis
+# frames grow.
+BESIDE_TRUNK_M = 0.03
+TALL_M, ARMS_ABOVE_M = 1.8, 0.12  # chosen: people who appear taller may raise their arms so far above their heads
 LEAST_WIDTH_M = 0.05  # chosen: of a body that is one pixel wide
 FILLED = 0.4  # minimum share of both sides of a rectangle that background behind an object fills; chosen
 
@@ -25,11 +30,12 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     """Estimate a box from the depth layer of the object in each rectangle of an image: the nearest layer that is
     dominant near the middle of the rectangle.
 
-    Background beside and between the limbs may fill most of a rectangle, but it is farther away. Around a person it fills
-    the outline of the rectangle, too, as furniture and other people at the sides do. Flying pixels are too sparse to
-    form a layer. The position is that of the vertical axis of the object: laterally halfway between the edges of the
-    layer, and behind its mean depth by the distance of its class. If the image border truncates the object, it is
-    completed to the usual size of its class. All of this is done in the level frame.
+    Background beside and between the limbs may fill most of a rectangle, but it is farther away. Around a person it
+    fills the outline of the rectangle, too, as furniture and other people at the sides do. Flying pixels are too sparse
+    to form a layer. The position is that of the vertical axis of the object: laterally halfway between the edges of the
+    layer, for people near the middle of the trunk, and behind its mean depth by the distance of its class. The height
+    of people does not include raised arms. If the image border truncates the object, it is completed to the usual size
+    of its class. All of this is done in the level frame.
 
     In the rectangles of nearer objects with plausible boxes, pixels that are not behind them are masked. Rectangles are
     therefore estimated in groups, each after those in front of it. Of several rectangles of one object, only the
@@ -71,17 +77,31 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
 
 
 def _surrounded(kind, truncated):
-    """Whether the left, the upper and the right edge of a rectangle show mainly what surrounds the object: not where the
-    image border truncates it, and not those of an ObjectClass that may be as rectangular as a chair. Below people is
-    the floor, or what hides their legs.
+    """Whether the left, the upper and the right edge of a rectangle show mainly what surrounds the object: not where
+    the image border truncates it, and not those of an ObjectClass that may be as rectangular as a chair. Below people
+    is the floor, or what hides their legs.
     """
     return tuple([kind.group == PERSON and not is_cut for is_cut in truncated[:3]])
 
 
-def _visible_extents(samples, flat_px, geometry, may_repeat):
-    """Left, right, upper and lower end of the object in a rectangle and its distance, metres, and its support.
+class _Extents(NamedTuple):
+    """Left, right, upper and lower end of what is visible of an object, the middle of its trunk, and its distance,
+    metres; its support.
+    """
 
-    Returns None without an object of its own. `may_repeat` is whether it may be the background of another object.
+    left_m: float
+    right_m: float
+    trunk_m: float
+    top_m: float
+    bottom_m: float
+    layer_m: float
+    support: float
+
+
+def _visible_extents(samples, flat_px, geometry, may_repeat):
+    """The _Extents of the object in a rectangle; None without an object of its own.
+
+    `may_repeat` is whether it may be the background of another object.
     """
     layer = samples.layer()
     count = layer.end - layer.first
@@ -98,8 +118,13 @@ def _visible_extents(samples, flat_px, geometry, may_repeat):
     upper, lower = slopes_down(flat_px, geometry)
     top_m, bottom_m = layer_m * upper, layer_m * lower
     looks_down = geometry.level_axes[1][2] > LOOKS_DOWN
-    left_m, right_m = samples.edges(on_body, bottom_m - FEET_M if looks_down else None)
-    return left_m, right_m, top_m, bottom_m, layer_m, support
+    left_m, right_m, trunk_m = samples.edges(on_body, bottom_m - FEET_M if looks_down else None)
+    if bottom_m - top_m > TALL_M:
+        left_px, top_px, right_px, bottom_px = flat_px
+        head_px = left_px, top_px + samples.pixels_above_head(on_body, trunk_m, layer_m), right_px, bottom_px
+        head_m = layer_m * slopes_down(head_px, geometry)[0]
+        top_m = head_m if head_m - top_m > ARMS_ABOVE_M else top_m
+    return _Extents(left_m, right_m, trunk_m, top_m, bottom_m, layer_m, support)
 
 
 def _fills_sides(on_body):
@@ -110,16 +135,19 @@ def _fills_sides(on_body):
 def _box(seen, rect_px, truncated, kind, geometry):
     """The Box3D of an object, completed where the image border truncates it, and the distance of its axis, metres.
 
-    `seen` are its visible extents, and `kind` is its ObjectClass.
+    `seen` are its _Extents, and `kind` is its ObjectClass.
     """
-    left_m, right_m, top_m, bottom_m, layer_m, support = seen
+    left_m, right_m, trunk_m, top_m, bottom_m, layer_m, support = seen
     cut_left, cut_top, cut_right, cut_bottom = truncated
     left_m, right_m = complete_truncated_extent(left_m, right_m, cut_left, cut_right, kind.width)
     top_m, bottom_m = complete_truncated_extent(top_m, bottom_m, cut_top, cut_bottom, kind.height)
+    middle_m = (left_m + right_m) / 2
+    if kind.group == PERSON and (left_m, right_m) == seen[:2]:
+        middle_m = min(max(middle_m, trunk_m - BESIDE_TRUNK_M), trunk_m + BESIDE_TRUNK_M)
     width_m = max(right_m - left_m, LEAST_WIDTH_M)
     axis_m = layer_m + kind.axis_behind(width_m)
     along_ray = axis_m / layer_m
-    across_m, down_m = (left_m + right_m) / 2 * along_ray, (top_m + bottom_m) / 2 * along_ray
+    across_m, down_m = middle_m * along_ray, (top_m + bottom_m) / 2 * along_ray
     center_m = [x * across_m + y * down_m + z * axis_m for x, y, z in zip(*geometry.level_axes)]
     size_m = np.array((width_m, bottom_m - top_m, width_m))
     return Box3D(np.array(center_m), size_m, rect_px, support, truncated, largest_m=kind.largest_m), axis_m

@@ -37,11 +37,15 @@ CROUCH = np.radians([105, 130, 25, 20])
 
 
 class Posture(NamedTuple):
-    """Posture while walking, standing or crouching."""
+    """Posture while walking, standing or crouching. Angles of limbs are relative to those of a standing body."""
 
     phase: float = 0.0   # of the gait, in cycles since left heel strike
     swing: float = 0.0   # 0 (standing) to 1 (walking)
     crouch: float = 0.0  # 0 to 1
+    lift_l: float = 0.0  # of the left arm, sideways; pi points it upwards
+    lift_r: float = 0.0
+    reach: float = 0.0   # of both arms, ahead
+    bend: float = 0.0    # of the chest, ahead
 
 
 def bone_transforms(posture):
@@ -77,17 +81,17 @@ def _joint_turns(posture):
     swing, crouch = posture.swing, posture.crouch
     twist = .10 * swing * np.cos(2 * np.pi * posture.phase)
     turns = {'pelvis': rotation(Z, -twist),
-             'chest': rotation(Z, 1.2 * twist).dot(rotation(Y, .03 * swing + CROUCH[3] * crouch)),
+             'chest': rotation(Z, 1.2 * twist).dot(rotation(Y, .03 * swing + CROUCH[3] * crouch + posture.bend)),
              'head': rotation(Z, -.3 * twist).dot(rotation(Y, -.7 * CROUCH[3] * crouch))}
-    for side, offset, sign in (('_l', 0, 1), ('_r', .5, -1)):
+    for side, offset, sign, lift in (('_l', 0, 1, posture.lift_l), ('_r', .5, -1, posture.lift_r)):
         phase = (posture.phase + offset) % 1
         hip, knee, ankle = (swing * (1 - crouch) * np.interp(phase, CYCLE, curve) + crouch * bend
                             for curve, bend in zip((HIP, KNEE, ANKLE), CROUCH))
         turns['thigh' + side] = rotation(Y, -hip).dot(rotation(X, -.03 * sign))
         turns['shin' + side] = rotation(Y, knee)
         turns['foot' + side] = rotation(Y, -ankle)
-        arm = ARM_SWING * swing * np.cos(2 * np.pi * phase) - .5 * crouch
-        turns['arm' + side] = rotation(Y, arm).dot(rotation(X, .03 * sign))
+        arm = ARM_SWING * swing * np.cos(2 * np.pi * phase) - .5 * crouch - posture.reach
+        turns['arm' + side] = rotation(Y, arm).dot(rotation(X, (.03 + lift) * sign))
         elbow = ELBOW * (1 + swing * max(0, np.sin(2 * np.pi * phase)))
         turns['forearm' + side] = rotation(Y, -elbow - .8 * crouch)
     return turns

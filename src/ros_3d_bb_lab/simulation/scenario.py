@@ -118,7 +118,8 @@ class Person(NamedTuple):
 class SceneObject(NamedTuple):
     """Object other than a person: `start` and `moves`, or `pushed_by` a person (number from 1).
 
-    Its shape is that of its class (see `scene_objects.SHAPES`) unless `size` (x, y, z) makes it a box.
+    Its shape is that of its class (see `scene_objects.SHAPES`) unless `size` (x, y, z) makes it a box, at the height
+    `above` over the floor.
     """
 
     label: str
@@ -128,6 +129,7 @@ class SceneObject(NamedTuple):
     repeat: bool = False
     pushed_by: Optional[int] = None
     size: Optional[Tuple[float, float, float]] = None
+    above: float = 0.0
     color: Optional[Color] = None
 
 
@@ -164,7 +166,7 @@ RANGES = (  # the same for numbers
       'angular_acceleration'}, lambda number: number > 0, 'more than 0'),
     ({'odometry_error'}, lambda number: -1 < number < 1, 'more than -1 and less than 1'),
     ({'rate'}, lambda number: number <= 1000, 'at most 1000'),
-    ({'wait', 'color_noise'}, lambda number: number >= 0, 'at least 0'),
+    ({'wait', 'color_noise', 'above'}, lambda number: number >= 0, 'at least 0'),
     ({'crouch', 'hips'}, lambda number: 0 <= number <= 1, '0 to 1'),
     ({'color', 'skin', 'hair', 'shirt', 'trousers'}, lambda number: 0 <= number <= 255, '0 to 255'))
 

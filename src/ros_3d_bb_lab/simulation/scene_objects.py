@@ -39,7 +39,8 @@ def object_mesh(scene_object, random):
 
     `random` mottles the sides.
     """
-    parts = SHAPES[scene_object.label] if scene_object.size is None else (Part(scene_object.size, (0, 0, 0)),)
+    one_box = scene_object.size and (Part(scene_object.size, (0, 0, scene_object.above)),)
+    parts = one_box or SHAPES[scene_object.label]
     color = scene_object.color or COLORS.get(scene_object.label, OTHER_COLOR)
     meshes = [box(part.size_m, color, random).moved(part.at_m, 0) for part in parts]
     offsets = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
