@@ -18,17 +18,27 @@ with open(os.path.join(ROOT, 'package.xml'), encoding='utf-8') as _stream:
 root_doc, CONTENTS = 'README', 'doc/index'
 source_suffix = {'.md': 'markdown', '.rst': 'restructuredtext'}
 include_patterns = ['*.md', 'CHANGELOG.rst', '.github/SUPPORT.md', 'doc/**', 'config/**']
-# Other spellings and words for the search.
-KEYWORDS = {'doc/licences': 'license licensing', 'doc/bags': 'offline faster than real time rosbag',
-            'doc/questions': 'pandas region zone mask static furniture follow re-identification alternatives',
-            'doc/container': 'docker 22.04 24.04', 'doc/frames_and_time': 'localization synchronized',
-            'doc/other_cameras': 'color synchronized', 'doc/troubleshooting': 'jump drift ghost false positives slow'}
+# Other spellings and words for the search, which ignores numbers.
+KEYWORDS = {
+    'doc/bags': 'offline faster than real time rosbag', 'doc/benchmarks': 'performance precision fps RMSE',
+    'doc/cameras': 'multiple multi-camera', 'doc/campaign': 'calibration calibrate ground truth',
+    'doc/container': 'docker ubuntu', 'doc/detectors': 'license human pedestrian CUDA TensorRT Jetson',
+    'doc/frames_and_time': 'localization synchronized timestamp clock center',
+    'doc/installing': 'apt dependencies Ubuntu uninstall', 'doc/jackal': 'Husky Clearpath autostart',
+    'doc/licences': 'license licensing', 'doc/other_cameras': 'color synchronized Kinect',
+    'doc/planners': 'navigation obstacle avoidance collision human-aware safety SLAM',
+    'doc/questions': 'pandas region zone mask static furniture follow re-identification alternatives humble ROS2',
+    'doc/realsense': 'D435 D435i D455 L515', 'doc/robot': 'color tilted height floor slow fps performance',
+    'doc/rviz': 'visualization display', 'doc/security': 'privacy GDPR',
+    'doc/topics': 'API interface subscriber message', 'doc/tracking': 'MOT SORT reid re-identification neighbor',
+    'doc/troubleshooting': 'jump drift ghost false positives slow error', 'doc/tuning': 'settings parameters yaml'}
+FOLDERS = {'msg': 'doc/messages.md', 'config': 'doc/nodes/index.md'}
 extensions = ['myst_parser']
 myst_enable_extensions = ['dollarmath']
 highlight_language = 'none'
 myst_heading_anchors = 3  # links to #headings are those of the repository's own pages
 html_theme = 'alabaster'
-html_static_path, html_css_files, html_js_files = ['static'], ['style.css'], ['copy.js']
+html_static_path, html_css_files, html_js_files = ['static'], ['style.css'], ['site.js']
 html_title, html_favicon = '%s %s' % (project, version), os.path.join(ROOT, 'doc', 'static', 'favicon.svg')
 html_theme_options = {'page_width': '1200px', 'body_max_width': '1000px', 'sidebar_width': '240px',
                       'code_font_size': '0.75em', 'description': 'People in 3D for a ROS 1 robot, version ' + version,
@@ -56,15 +66,23 @@ def _navigation():
 
 
 def _prepare(_app, name, source):
-    """Tell Sphinx the navigation, and keep only the words of links to folders, which no site has."""
+    """Tell Sphinx the navigation, and lead links to folders to the generated pages; other folders are words only."""
     here = os.path.dirname(os.path.join(ROOT, name))
-    source[0] = LINK.sub(
-        lambda link: link.group(1) if os.path.isdir(os.path.join(here, link.group(2))) else link.group(), source[0])
+
+    def linked(link):
+        folder = os.path.join(here, link.group(2))
+        if not os.path.isdir(folder):
+            return link.group()
+        page = FOLDERS.get(os.path.relpath(folder, ROOT))
+        return '[%s](%s)' % (link.group(1), os.path.relpath(os.path.join(ROOT, page), here)) if page else link.group(1)
+
+    source[0] = LINK.sub(linked, source[0])
     if name == root_doc:
         for caption, pages in _navigation():
             source[0] += '\n```{toctree}\n:hidden:\n:caption: %s\n\n%s\n```\n' % (caption, '\n'.join(pages))
     if name in KEYWORDS:
-        source[0] = '---\nmyst:\n  html_meta:\n    keywords: %s\n---\n%s' % (KEYWORDS[name], source[0])
+        source[0] = '---\nmyst:\n  html_meta:\n    keywords: %s\n---\n%s' % (
+            ', '.join(KEYWORDS[name].split()), source[0])
 
 
 def _write_first_page(app, _exception):

@@ -8,9 +8,10 @@ import os
 import sys
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
-settings.register_profile('repeatable', derandomize=True, database=None, deadline=None)
+settings.register_profile('repeatable', derandomize=True, database=None, deadline=None,  # on a busy machine, too
+                          suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile('repeatable')
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, HERE)

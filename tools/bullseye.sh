@@ -15,7 +15,8 @@ check_root_rights() {
     root_sudo=(sudo)
   fi
   "${root_sudo[@]}" unshare --mount --propagation private true 2> /dev/null \
-    || untestable "'unshare --mount' is refused here, as in a container without the capability SYS_ADMIN"
+    || untestable "'unshare --mount' is refused here; a container needs --cap-add SYS_ADMIN and, on systems with" \
+      "AppArmor, --security-opt apparmor=unconfined"
 }
 
 set_up_debootstrap() {

@@ -78,12 +78,15 @@ build() {
   say "building in $workspace"
   link_into_workspace
   catkin_make --directory "$workspace" -DPYTHON_EXECUTABLE="$venv/bin/python3" \
-    -Dros_3d_bb_LEAVE_OUT_TESTS="$(is_debian_11 && echo ON || echo OFF)" \
+    -Dros_3d_bb_LEAVE_OUT_TESTS="$({ [ -n "${platform:-}" ] || is_debian_11; } && echo ON || echo OFF)" \
     -Dros_3d_bb_TEST_PLANNERS="$([ -d "${ROS_3D_BB_DATA:-}/planners" ] && echo ON || echo OFF)" \
     > "$workspace/build.log" 2>&1 || {
     cat "$workspace/build.log"; say "the build failed; its log is above"; exit 1; }
   [ -n "${platform:-}" ] || link_common_path
   set +u; . "$workspace/devel/setup.bash"; set -u
-  [ -z "${platform:-}" ] || export ROS_PACKAGE_PATH=$ROS_PACKAGE_PATH:/usr/share  # Debian's rospkg searches it by default
+  if [ -n "${platform:-}" ]; then
+    export PATH=$venv/bin:$PATH  # for scripts that begin with env python3
+    export ROS_PACKAGE_PATH=$ROS_PACKAGE_PATH:/usr/share  # Debian's rospkg searches it by default
+  fi
   export ROS_LOG_DIR=${ROS_LOG_DIR:-$workspace/log}
 }

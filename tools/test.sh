@@ -16,7 +16,8 @@ run_tests() {
     --long)
       [ $# -eq 1 ] || fail "test --long takes no further arguments, not '$2'"
       pytest_options+=(--long)
-      run_some_tests "$here/test/workspace" ;;
+      run_some_tests "$here/test/workspace"
+      rostest "$here/test/nodes/soak.test" minutes:=2 ;;
     --platform) test_on_platform "${@:2}" ;;
     *) run_some_tests "$@" ;;
   esac
@@ -54,10 +55,13 @@ test_on_platform() {  # NAME [--python PATH] [--fast | -k EXPR | PATH ...]
     use_platform "$name"
   fi
   pytest_options=(--leave-out)
-  if [ "${1:-}" = --fast ]; then run_tests "$@"; else run_some_tests "$@"; fi
+  case ${1:-} in
+    ''|--fast) run_tests "$@" ;;
+    *) run_some_tests "$@" ;;
+  esac
 }
 
-# Test files and folders by pytest, .test files by rostest; without any, the unit and workspace tests with -k EXPR.
+# Test files and folders by pytest, .test files by rostest; with -k EXPR only, the unit and workspace tests.
 run_some_tests() {
   local paths=() expression=() path
   while [ $# -gt 0 ]; do

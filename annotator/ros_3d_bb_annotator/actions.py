@@ -37,7 +37,6 @@ MENUS = (
         Action('edit_box', 'Move or resize the &box', ('B', 'Ctrl+B')),
         Action('delete_box', 'D&elete the box', ('Del', 'Ctrl+Shift+D')),
         LINE,
-        Action('switch_unit', 'Switch between millimetres and &metres', ('Ctrl+U',)),
         Action('edit_marks', '&Floor marks…', ('Ctrl+G',)))),
     ('&Go', (
         Action('next', '&Next measurement', ('PgDown',)),

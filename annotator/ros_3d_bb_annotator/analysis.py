@@ -15,34 +15,31 @@ from ros_3d_bb_lab.evaluation.noise.tables import MeasurementTable, read_session
 class Analysed(NamedTuple):
     """Results of an analysis.
 
-    `figures` are pairs (path, caption), `text` contains mean error and spread of both axes. `no_model` is the reason
-    why there is no cross-validated error model, or empty. `outliers` were left out.
+    `text` contains mean error and spread of both axes. `no_model` is the reason why there is no cross-validated error
+    model, or empty. `outliers` were left out.
     """
 
     folder: str
     report_path: str
-    figures: Tuple[Tuple[str, str], ...]
     text: str
     no_model: str
     outliers: Tuple[Any, ...]
 
 
-def analyse(document, folder=None, estimator=None, progress=lambda share: None):
+def analyse(document, folder=None, estimator=None):
     """Analyse the errors of the annotated measurements of a document. Writes report, figures and error model.
 
     The results are written to `folder`, by default `analysis` in the session. `estimator` is 'foreground', 'median', or
     'recorded' for the stored estimates. The default is that of bbox3d_node, or 'recorded' for the old format, which has
-    no depth. `progress` is called with the share 0..1 that is done. Raises ValueError if there are too few
-    measurements.
+    no depth. Raises ValueError if there are too few measurements.
     """
     folder = pathlib.Path(folder or os.path.join(document.folder, 'analysis'))
     estimator = estimator or default_estimator(document)
     measurements = (_recorded(document, estimator) if document.is_old_format
-                    else read_session_measurements(document.folder, estimator, lambda share: progress(0.2 * share)))
-    analysis = analyse_noise(Inputs.of_session(measurements, estimator, 'unknown'),
-                             lambda share: progress(0.2 + 0.5 * share))
-    figures = write_results(folder, analysis, lambda share: progress(0.7 + 0.3 * share))
-    return Analysed(str(folder), str(folder / 'report.html'), figures, text_of(analysis), analysis.no_model,
+                    else read_session_measurements(document.folder, estimator))
+    analysis = analyse_noise(Inputs.of_session(measurements, estimator, 'unknown'))
+    write_results(folder, analysis)
+    return Analysed(str(folder), str(folder / 'report.html'), text_of(analysis), analysis.no_model,
                     analysis.inputs.outliers)
 
 

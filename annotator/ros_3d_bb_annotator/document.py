@@ -16,7 +16,6 @@ from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, est
 from ros_3d_bb.sessions.session_reader import (Session, SessionError, camera_of, boxes_of_others, read_color,
                                                read_depth, read_description, session_errors)
 from ros_3d_bb_annotator import legacy
-from ros_3d_bb_annotator.drafts import Drafts
 from ros_3d_bb_annotator.entries import (Edit, changed, detections_of, drawn, entry_at, grid_of, mark_entry,
                                          truth_entry, with_detections, with_person)
 from ros_3d_bb_annotator.estimates import Estimates
@@ -43,7 +42,7 @@ class Document(object):
         self.camera = self._session.camera
         self._content, self._signature = {'frames': []}, None
         self._undo, self._redo, self._annotated = [], [], []
-        self._drafts = Drafts(folder)
+        self._drafts = {}  # fields by the ID of the measurement
         self.estimates = Estimates(self)
         self._update(content)
 
@@ -121,14 +120,9 @@ class Document(object):
         dx_m, dz_m = (float(positions[measurement.person][axis] - measurement.truth_m[axis]) for axis in (0, 2))
         return dx_m, dz_m, float(np.hypot(dx_m, dz_m))
 
-    def outliers(self, progress=lambda share: None):
-        """Implausible truths, as (index, detection, Outlier).
-
-        Computes missing estimates, and calls `progress` with the share 0..1 of them.
-        """
-        missing = list(self.estimates.missing())
-        for count, index in enumerate(missing):
-            progress(count / len(missing))
+    def outliers(self):
+        """Implausible truths, as (index, detection, Outlier). Computes missing estimates."""
+        for index in list(self.estimates.missing()):
             self.estimates.of(index)
         return [(index, person, self.estimates.outlier(index, person))
                 for index, people in sorted(self.estimates.implausible().items()) for person in people]
@@ -257,10 +251,10 @@ class Document(object):
 
     def draft(self, index):
         """Draft of a measurement, the text that was typed but not entered: {name of a field: text}."""
-        return self._drafts.of(self.measurements[index].id)
+        return self._drafts.get(self.measurements[index].id, {})
 
     def set_draft(self, index, fields):
-        self._drafts.set(self.measurements[index].id, fields)
+        self._drafts[self.measurements[index].id] = {name: text for name, text in fields.items() if text}
 
     def _drawn(self, index, box_px):
         """Clip a box to the image. Returns it and its estimate."""

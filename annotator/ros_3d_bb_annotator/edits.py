@@ -2,6 +2,7 @@
 from ros_3d_bb.sessions.session_reader import SessionError
 from ros_3d_bb_annotator import dialogs
 from ros_3d_bb_annotator.document import Document
+from ros_3d_bb_annotator.truth_panel import error_text
 from ros_3d_bb_annotator.validation import truth_problems
 
 
@@ -122,7 +123,7 @@ class Edits(object):
         window, index = self._window, self._window.current
         if self._edit(lambda document, _index: edit(document)):
             window.last_entry.setText('<b>%s</b>: %s' % (
-                window.measurement.id, text or window.pane.error_text(window.document.errors(index))))
+                window.measurement.id, text or error_text(window.document.errors(index))))
             if window.actions['go_on'].isChecked():
                 window.next_new()
 

@@ -17,13 +17,12 @@ ARROWS = {Qt.Key_Left: (-1, 0), Qt.Key_Right: (1, 0), Qt.Key_Up: (0, 1), Qt.Key_
 
 
 class FloorScene(NamedTuple):
-    """Marks on the floor, positions (x, z) in metres or None, tangents of the limits of the field of view, and unit."""
+    """Marks on the floor, positions (x, z) in metres or None, and tangents of the limits of the field of view."""
 
     marks: Tuple[Any, ...]
     truth_m: Optional[Tuple[float, float]]
     estimate_m: Optional[Tuple[float, float]]
     sight: Tuple[float, float]
-    unit: str = 'mm'
 
 
 EMPTY = FloorScene((), None, None, (0.0, 0.0))
@@ -107,7 +106,7 @@ class GridView(QtWidgets.QWidget):
             painter.drawLine(self.place_of(4 * left_m, z_m), self.place_of(4 * right_m, z_m))
         painter.setPen(TEXT)
         for z_m in depths_m[1:]:
-            painter.drawText(QtCore.QPointF(4, self.place_of(0, z_m).y() - 2), length_text(z_m, self._scene.unit))
+            painter.drawText(QtCore.QPointF(4, self.place_of(0, z_m).y() - 2), length_text(z_m))
         camera = self.place_of(0, 0)
         sides = [self.place_of(tangent * 10 * far_m, 10 * far_m) for tangent in self._scene.sight]
         painter.setPen(Qt.NoPen)
@@ -171,8 +170,7 @@ class GridView(QtWidgets.QWidget):
 
     def _point_at(self, mark):
         self._pointed = mark
-        self.setToolTip('' if mark is None else '%s: %s' % (
-            mark.name, position_text((mark.x_m, None, mark.z_m), self._scene.unit)))
+        self.setToolTip('' if mark is None else '%s: %s' % (mark.name, position_text((mark.x_m, None, mark.z_m))))
         self.update()
 
     def _mark_at(self, position):

@@ -234,16 +234,8 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self.statusBar().showMessage('Drag a box around the person, or move the cursor with the arrows and set two '
                                      'corners with Space; Esc cancels' if drawing else '')
 
-    def _on_unit(self):
-        """Show all lengths in the unit of the fields."""
-        self.list.show_unit(self.pane.truth.unit)
-        self.pane.update_unit()
-
     def _keep_draft(self, texts):
-        try:
-            self.document.set_draft(self.current, texts)
-        except (ValueError, OSError) as error:
-            self.pane.truth.show_problem(str(error))
+        self.document.set_draft(self.current, texts)
 
     def _show_state(self):
         done, count = self.document.progress if self.document is not None else (0, 0)
@@ -289,7 +281,6 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self.pane.person_chosen.connect(self.edits.choose_person)
         self.pane.shared.box_drawn.connect(self.edits.add_box)
         self.pane.shared.box_edited.connect(self.edits.replace_box)
-        self.pane.truth.unit_changed.connect(self._on_unit)
         self.pane.shared.drawing_changed.connect(self._on_drawing)
         self.pane.truth.entered.connect(self.edits.enter_truth)
         self.pane.truth.typed.connect(self._keep_draft)
@@ -319,14 +310,11 @@ def run_window(folder=None):
     status = application.exec_()
     settings.setValue('geometry', window.saveGeometry())
     settings.setValue('split', window.split.saveState())
-    settings.setValue('unit', window.pane.truth.unit)
     return status
 
 
 def _restore_layout(window, settings):
-    """Restore size, division and unit of the window as it was closed."""
+    """Restore size and division of the window as it was closed."""
     for name, restore in (('geometry', window.restoreGeometry), ('split', window.split.restoreState)):
         if settings.value(name) is not None:
             restore(settings.value(name))
-    if settings.value('unit') == 'm':
-        window.pane.truth.switch_unit()

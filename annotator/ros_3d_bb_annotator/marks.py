@@ -4,7 +4,6 @@ import re
 from ros_3d_bb_annotator.lengths import parse_length
 from ros_3d_bb_annotator.measurement import Mark
 
-UNIT = 'mm'  # of lengths without a unit
 HEADER = re.compile(r'\s*"?(name|mark|label)\b', re.IGNORECASE)
 
 
@@ -13,7 +12,7 @@ def mark_of(name, x, z, where):
     if not name.strip():
         raise ValueError('%s: the name is empty' % where)
     try:
-        mark = Mark(name.strip(), parse_length(x, UNIT), parse_length(z, UNIT))
+        mark = Mark(name.strip(), parse_length(x), parse_length(z))
     except ValueError as error:
         raise ValueError('%s: %s' % (where, error))
     if not mark.z_m > 0:

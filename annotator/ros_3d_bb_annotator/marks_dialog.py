@@ -1,5 +1,5 @@
 """Dialog for the floor marks: a table, a grid generator, and tables from files and the clipboard."""
-from ros_3d_bb_annotator.marks import UNIT, checked, grid_of, mark_of, parse_marks
+from ros_3d_bb_annotator.marks import checked, grid_of, mark_of, parse_marks
 from ros_3d_bb_annotator.qt import QtGui, QtWidgets
 
 HEADER = ('Name', 'X', 'Z')
@@ -90,8 +90,8 @@ class MarksDialog(QtWidgets.QDialog):
             grid.addWidget(field, row, 1)
         grid.addWidget(add_grid, 1, 2)
         layout = QtWidgets.QVBoxLayout(self)
-        layout.addWidget(QtWidgets.QLabel('X is to the right of the camera, Z ahead of it, in %s or with a unit '
-                                          '(1.5 m).' % UNIT))
+        layout.addWidget(QtWidgets.QLabel('X is to the right of the camera, Z ahead of it, in mm or with a unit '
+                                          '(1.5 m).'))
         layout.addWidget(self.table)
         layout.addLayout(grid)
         layout.addWidget(self.problem)

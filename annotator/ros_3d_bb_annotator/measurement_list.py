@@ -19,7 +19,7 @@ class MeasurementModel(QtCore.QAbstractTableModel):
 
     def __init__(self, parent=None):
         super(MeasurementModel, self).__init__(parent)
-        self._document, self._count, self.unit = None, 0, 'mm'
+        self._document, self._count = None, 0
 
     def show_document(self, document):
         self.beginResetModel()
@@ -42,8 +42,8 @@ class MeasurementModel(QtCore.QAbstractTableModel):
         if role == Qt.DisplayRole and orientation == Qt.Horizontal:
             return COLUMNS[section]
         if role == Qt.ToolTipRole and COLUMNS[section] in NUMBERS:
-            return {'X': 'True X [%s]', 'Z': 'True Z [%s]'}.get(
-                COLUMNS[section], 'Distance of the analysed estimate from the true position [%s]') % self.unit
+            return {'X': 'True X [mm]', 'Z': 'True Z [mm]'}.get(
+                COLUMNS[section], 'Distance of the analysed estimate from the true position [mm]')
         return None
 
     def state_of(self, row):
@@ -87,7 +87,7 @@ class MeasurementModel(QtCore.QAbstractTableModel):
         measurement = self._document.measurements[row]
         values_m = zip(self._values_m(row), (True, False, False))
         return [measurement.id, measurement.label, self.state_of(row)] + [
-            '' if value_m is None else number_text(value_m, self.unit, signed) for value_m, signed in values_m]
+            '' if value_m is None else number_text(value_m, signed) for value_m, signed in values_m]
 
     def _sort_key(self, row, column):
         if COLUMNS[column] not in NUMBERS:
@@ -145,10 +145,6 @@ class MeasurementList(QtWidgets.QWidget):
     def selection(self):
         """Indices of the selected measurements in the order of the session."""
         return sorted(self._filter.mapToSource(index).row() for index in self.table.selectionModel().selectedRows())
-
-    def show_unit(self, unit):
-        self._model.unit = unit
-        self._model.update_rows()
 
     def show_document(self, document):
         self._document = document

@@ -36,7 +36,7 @@ class MeasurementPane(QtWidgets.QWidget):
         self.readout = QtWidgets.QLabel()
         self.people, self.buttons = QtWidgets.QListWidget(), QtWidgets.QGridLayout()
         self._document, self._pictures, self._measurement, self._shown, self._index = (None,) * 5
-        self._scale, self._samples_shown = depth_scale(), True
+        self._legend, self._samples_shown = (depth_scale(), length_text(DEPTH_RANGE_M), length_text(0)), True
         self._lay_out()
         self.header.setText('No session is open: File, Open a session (Ctrl+O).')
         for view in (self.color_view, self.depth_view):
@@ -81,7 +81,7 @@ class MeasurementPane(QtWidgets.QWidget):
         scene = self._scene()
         self.color_view.show_image(pictures.color_image, scene, pictures.color_problem)
         self.depth_view.show_image(pictures.depth_image, scene, pictures.depth_problem)
-        self.depth_view.show_legend(self._legend() if pictures.depth else None)
+        self.depth_view.show_legend(self._legend if pictures.depth else None)
         self._show_people(measurement)
         self.truth.show_truth(measurement.truth_m, self._document.draft(number), self._document.mark_of(number))
         self._show_readout()
@@ -96,18 +96,6 @@ class MeasurementPane(QtWidgets.QWidget):
     def _scene(self):
         return self._scene_of(self._shown.depth if self._samples_shown else None)
 
-    def error_text(self, errors_m):
-        """Text of errors (x, z, ...) in the current unit."""
-        return error_text(errors_m, self.truth.unit)
-
-    def update_unit(self):
-        """Show the lengths in the unit of the truth, which has changed."""
-        if self._measurement is not None:
-            self.show_samples(self._samples_shown)
-            self.depth_view.show_legend(self._legend() if self._shown.depth else None)
-            self._show_people(self._measurement)
-            self._show_readout()
-
     def edit_box(self):
         """Start to move or resize the selected box by the keyboard."""
         box = self._scene().person_box() if self._measurement is not None else None
@@ -115,9 +103,6 @@ class MeasurementPane(QtWidgets.QWidget):
             self.shared.start_editing(box.rect_px)
             self.color_view.setFocus()
         return box is not None
-
-    def _legend(self):
-        return self._scale, length_text(DEPTH_RANGE_M, self.truth.unit), length_text(0, self.truth.unit)
 
     def _show_header(self, measurement):
         details = [text for text in (measurement.label, measurement.stamp_text and 'at %s s' % measurement.stamp_text,
@@ -133,7 +118,7 @@ class MeasurementPane(QtWidgets.QWidget):
         for number, (detection, position_m) in enumerate(
                 zip(self._measurement.detections, self._document.estimates.of(self._index))):
             if detection.box_px is not None:
-                distance = '' if position_m is None else ': %s' % length_text(position_m[2], self.truth.unit)
+                distance = '' if position_m is None else ': %s' % length_text(position_m[2])
                 boxes.append(MarkedBox(number, detection.box_px, '%d%s' % (number + 1, distance), detection.by_hand))
         sample = estimator_named(ESTIMATOR).sample
         samples = () if depth is None else tuple(
@@ -150,7 +135,7 @@ class MeasurementPane(QtWidgets.QWidget):
         positions = self._document.estimates.of(self._index)
         for number, (detection, position_m) in enumerate(zip(measurement.detections, positions)):
             item = QtWidgets.QListWidgetItem(
-                _detection_text(number, detection, position_m, measurement.truths.get(number), self.truth.unit))
+                _detection_text(number, detection, position_m, measurement.truths.get(number)))
             font = item.font()
             font.setBold(number == measurement.person)
             item.setFont(font)
@@ -160,7 +145,7 @@ class MeasurementPane(QtWidgets.QWidget):
 
     def _show_readout(self):
         depth, camera = (self._shown.depth, self._document.camera) if self._shown is not None else (None, None)
-        self.readout.setText(_readout_text(self.shared.cursor, depth, camera, self.truth.unit))
+        self.readout.setText(_readout_text(self.shared.cursor, depth, camera))
 
     def _show_preview(self, truth_m):
         """Show error and floor for the typed truth (x, y, z), or without truth for None."""
@@ -175,12 +160,12 @@ class MeasurementPane(QtWidgets.QWidget):
         position_m = None if person is None else document.estimates.of(self._index)[person]
         error_m = None if truth_m is None or position_m is None else (
             float(position_m[0]) - truth_m[0], float(position_m[2]) - truth_m[2])
-        self.truth.show_error(self.error_text(error_m), warning)
+        self.truth.show_error(error_text(error_m), warning)
         camera = document.camera
         sight = (0.0, 0.0) if camera is None else (-camera.cx / camera.fx, (camera.width - camera.cx) / camera.fx)
         self.floor.show_scene(FloorScene(
             document.grid, None if truth_m is None else (truth_m[0], truth_m[2]),
-            None if position_m is None else tuple(position_m[[0, 2]].tolist()), sight, self.truth.unit))
+            None if position_m is None else tuple(position_m[[0, 2]].tolist()), sight))
 
     def _lay_out(self):
         views = QtWidgets.QSplitter(Qt.Horizontal)
@@ -219,17 +204,17 @@ def _label():
     return label
 
 
-def _detection_text(number, detection, position_m, truth_m, unit):
+def _detection_text(number, detection, position_m, truth_m):
     """Description of a detection: the analysed estimate, the recorded one, and details."""
     details = (detection.support is not None and 'support %.0f %%' % (100 * detection.support),
                detection.truncated and 'truncated', detection.by_hand and 'drawn by hand')
-    lines = ('no estimate' if position_m is None else position_text(position_m, unit),
-             detection.estimate_m is not None and 'recorded: %s' % position_text(detection.estimate_m, unit),
-             truth_m is not None and 'true: %s' % position_text(truth_m, unit), ', '.join(filter(None, details)))
+    lines = ('no estimate' if position_m is None else position_text(position_m),
+             detection.estimate_m is not None and 'recorded: %s' % position_text(detection.estimate_m),
+             truth_m is not None and 'true: %s' % position_text(truth_m), ', '.join(filter(None, details)))
     return '%d: %s' % (number + 1, '\n'.join(filter(None, lines)))
 
 
-def _readout_text(cursor, depth, camera, unit):
+def _readout_text(cursor, depth, camera):
     """Text with pixel, depth and position at the cursor (u, v) or None. `depth` is a DepthImage or None."""
     if cursor is None:
         return 'Point at the image to read pixel, depth and position'
@@ -241,4 +226,4 @@ def _readout_text(cursor, depth, camera, unit):
         return text + '    no depth'
     x_m, y_m, z_m = camera.deproject(cursor, depth_m).tolist()
     return text + '    depth %s    X %s  Y %s  Z %s' % (
-        length_text(depth_m, unit), length_text(x_m, unit, True), length_text(y_m, unit, True), length_text(z_m, unit))
+        length_text(depth_m), length_text(x_m, True), length_text(y_m, True), length_text(z_m))

@@ -3,48 +3,31 @@ import os
 
 from ros_3d_bb_annotator import dialogs
 from ros_3d_bb_annotator.export import default_estimator, export
-from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets, Signal
+from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets
 
 FORMS = ('CSV, one row per person (*.csv)', 'CSV in the form of the thesis (*.csv)')
 
 
-class Cancelled(Exception):
-    """Raised in the thread of a Work that is cancelled."""
-
-
 class Work(QtCore.QThread):
-    """Calls `work(progress)` in a thread. Afterwards `result` is its return value, or `error` its exception.
-
-    `work` calls `progress` with the share 0..1 that is done, which raises Cancelled after `cancel`.
-    """
-
-    progressed = Signal(float)
+    """Calls `work()` in a thread. Afterwards `result` is its return value, or `error` its exception."""
 
     def __init__(self, work, parent=None):
         super(Work, self).__init__(parent)
-        self._work, self._is_cancelled, self.result, self.error = work, False, None, None
+        self._work, self.result, self.error = work, None, None
 
     def run(self):
         try:
-            self.result = self._work(self._progress)
+            self.result = self._work()
         except Exception as error:  # reported by the thread that waits
             self.error = error
 
-    def cancel(self):
-        self._is_cancelled = True
-
-    def _progress(self, share):
-        if self._is_cancelled:
-            raise Cancelled()
-        self.progressed.emit(share)
-
 
 class Results(QtCore.QObject):
-    """Exports and analyses the document of a window. `figures` is the last AnalysisWindow."""
+    """Exports and analyses the document of a window. `analysed` is the last `analysis.Analysed`."""
 
     def __init__(self, window):
         super(Results, self).__init__(window)
-        self._window, self._work, self.figures = window, None, None
+        self._window, self._work, self.analysed = window, None, None
 
     @property
     def is_busy(self):
@@ -69,106 +52,48 @@ class Results(QtCore.QObject):
         self._window.statusBar().showMessage('%d rows written to %s' % (count, path))
 
     def analyse(self):
-        """Name implausible truths, run the noise analysis and show its figures. Editing is blocked meanwhile."""
+        """Name implausible truths, run the noise analysis and open its report. Editing is blocked meanwhile."""
         self._window.keep_typed()
-        document = self._window.document
-        self._start('Estimating positions…', lambda progress: document.outliers(progress), self._on_outliers)
+        self._start('Estimating positions…', self._window.document.outliers, self._on_outliers)
 
     def wait(self):
         """Wait for a running analysis, because threads must end before Qt is destroyed."""
         if self._work is not None:
-            self._work.cancel()
             self._work.wait()
 
     def _start(self, text, work, then):
-        """Run `work(progress)` in a thread with a progress dialog, and call `then(result)` if it succeeds."""
-        waiting = QtWidgets.QProgressDialog(text, 'Cancel', 0, 100, self._window)
+        """Run `work()` in a thread while a dialog shows a text, and call `then(result)` if it succeeds."""
+        waiting = QtWidgets.QProgressDialog(text, None, 0, 0, self._window)
         waiting.setWindowTitle('Noise analysis')
         waiting.setWindowModality(Qt.WindowModal)
-        waiting.setMinimumDuration(300)
-        waiting.setAutoReset(False)
         self._work = Work(work, self)
-        waiting.canceled.connect(self._work.cancel)
-        self._work.progressed.connect(lambda share: waiting.setValue(int(100 * share)))
         self._work.finished.connect(lambda: self._on_finished(waiting, then))
-        waiting.setValue(0)
+        waiting.show()
         self._work.start()
 
     def _on_finished(self, waiting, then):
         waiting.reset()
         waiting.deleteLater()
-        work = self._work
-        if isinstance(work.error, Cancelled):
-            self._window.statusBar().showMessage('The noise analysis was cancelled')
-        elif work.error is not None:
-            dialogs.show_error(self._window, 'The noise analysis failed', work.error)
+        if self._work.error is not None:
+            dialogs.show_error(self._window, 'The noise analysis failed', self._work.error)
         else:
-            then(work.result)
+            then(self._work.result)
 
     def _on_outliers(self, outliers):
         answer = dialogs.ask_outliers(self._window, outliers) if outliers else dialogs.ANALYSE
         if answer == dialogs.ANALYSE:
             document = self._window.document
-            self._start('Fitting the error model…', lambda progress: _analysed(document, progress), self._on_analysed)
+            self._start('Fitting the error model…', lambda: _analysed(document), self._on_analysed)
         elif answer is not None:
             self._window.show_measurement(answer)
             self._window.pane.truth.begin()
 
     def _on_analysed(self, analysed):
-        self.figures = AnalysisWindow(analysed, self._window)
-        self.figures.show()
+        self.analysed = analysed
+        self._window.statusBar().showMessage('Report, figures and error model are in %s' % analysed.folder)
+        QtGui.QDesktopServices.openUrl(QtCore.QUrl.fromLocalFile(analysed.report_path))
 
 
-def _analysed(document, progress):
+def _analysed(document):
     from ros_3d_bb_annotator.analysis import analyse  # optional scipy and matplotlib take a second
-    return analyse(document, progress=progress)
-
-
-class AnalysisWindow(QtWidgets.QDialog):
-    """Shows an `analysis.Analysed`: a list of figures, and the current one scaled to the width of its scroll area."""
-
-    def __init__(self, analysed, parent=None):
-        super(AnalysisWindow, self).__init__(parent)
-        self.setWindowTitle('Noise analysis – %s' % analysed.folder)
-        self.setAttribute(Qt.WA_DeleteOnClose)
-        self.resize(QtCore.QSize(1150, 780).boundedTo(
-            QtWidgets.QApplication.primaryScreen().availableSize() * 0.95))
-        summary = QtWidgets.QLabel('\n'.join(filter(None, (
-            analysed.text, analysed.no_model and 'No cross-validated error model: %s' % analysed.no_model,
-            '; '.join(map(str, analysed.outliers)) and 'Left out: ' + '; '.join(map(str, analysed.outliers)),
-            'Report, figures and error model are in %s' % analysed.folder))))
-        summary.setTextInteractionFlags(Qt.TextSelectableByMouse)
-        summary.setWordWrap(True)
-        self._figures, self._full = analysed.figures, QtGui.QPixmap()
-        self.names, self.picture, self._area = QtWidgets.QListWidget(), QtWidgets.QLabel(), QtWidgets.QScrollArea()
-        self.names.addItems([title for _path, title in analysed.figures])
-        self.names.setFixedWidth(240)
-        self.names.setWordWrap(True)
-        self.picture.setAlignment(Qt.AlignCenter)
-        self.picture.setStyleSheet('background: white')
-        self._area.setWidget(self.picture)
-        self._area.setWidgetResizable(True)
-        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarAlwaysOff)
-        buttons = QtWidgets.QDialogButtonBox(QtWidgets.QDialogButtonBox.Close)
-        report = buttons.addButton('Open the &report', QtWidgets.QDialogButtonBox.ActionRole)
-        report.clicked.connect(lambda: QtGui.QDesktopServices.openUrl(QtCore.QUrl.fromLocalFile(analysed.report_path)))
-        buttons.rejected.connect(self.reject)
-        layout = QtWidgets.QGridLayout(self)
-        layout.addWidget(summary, 0, 0, 1, 2)
-        layout.addWidget(self.names, 1, 0)
-        layout.addWidget(self._area, 1, 1)
-        layout.addWidget(buttons, 2, 0, 1, 2)
-        self.names.currentRowChanged.connect(self._show)
-        self.names.setCurrentRow(0)
-
-    def resizeEvent(self, event):  # noqa: N802 (Qt's name)
-        super(AnalysisWindow, self).resizeEvent(event)
-        self._fit()
-
-    def _show(self, row):
-        self._full = QtGui.QPixmap(self._figures[row][0])
-        self._fit()
-
-    def _fit(self):
-        width = min(self._area.viewport().width(), self._full.width())
-        self.picture.setPixmap(self._full.scaledToWidth(width, Qt.SmoothTransformation))
+    return analyse(document)

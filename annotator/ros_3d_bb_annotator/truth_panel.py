@@ -1,13 +1,12 @@
 """Fields for the truth of a measurement, and the resulting error."""
 import math
 
-from ros_3d_bb_annotator.lengths import METRES, length_text, parse_length
+from ros_3d_bb_annotator.lengths import length_text, parse_length
 from ros_3d_bb_annotator.qt import QtCore, QtGui, QtWidgets, Signal
 
 FIELDS = (('x', '&X (right)'), ('z', '&Z (ahead)'), ('y', '&Y (down)'))
 WARNING = '#a04000'
-UNITS = ('mm', 'm')
-TYPING_MS = 300  # typed text is saved after a pause of this length
+TYPING_MS = 300  # typed text is kept after a pause of this length
 
 
 class LengthEdit(QtWidgets.QLineEdit):
@@ -26,20 +25,16 @@ class TruthPanel(QtWidgets.QGroupBox):
     """Panel of the truth.
 
     Signals: `entered` with (x_m, z_m, y_m or None) when Enter is pressed on a complete position; `typed` with the text
-    of the fields to be saved; `previewed` with the current (x_m, y_m or None, z_m), or None if incomplete;
-    `unit_changed` when `unit` is another one.
+    of the fields to be saved; `previewed` with the current (x_m, y_m or None, z_m), or None if incomplete.
     """
 
     entered = Signal(float, float, object)
     typed = Signal(dict)
     previewed = Signal(object)
-    unit_changed = Signal()
 
     def __init__(self, parent=None):
-        super(TruthPanel, self).__init__('True position', parent)
+        super(TruthPanel, self).__init__('True position, mm', parent)
         self.fields = {name: LengthEdit() for name, _label in FIELDS}
-        self.unit_box = QtWidgets.QComboBox()
-        self.unit_box.addItems(UNITS)
         self.error_label, self.hint_label = QtWidgets.QLabel(), QtWidgets.QLabel()
         self._stored = self.texts()
         self._timer = QtCore.QTimer(self, singleShot=True, interval=TYPING_MS)
@@ -48,31 +43,23 @@ class TruthPanel(QtWidgets.QGroupBox):
         for field in self.fields.values():
             field.textEdited.connect(self._on_typed)
             field.returnPressed.connect(self._on_enter)
-        self.unit_box.activated.connect(self._on_unit)
-
-    @property
-    def unit(self):
-        return self.unit_box.currentText()
 
     def show_truth(self, truth_m, draft, offered=None):
         """Show the truth (x, y, z) of a person or None, or its draft, or else the position of an offered Mark."""
         self._timer.stop()
-        if draft.get('unit', self.unit) != self.unit and draft['unit'] in UNITS:
-            self.unit_box.setCurrentText(draft['unit'])
-            self.unit_changed.emit()
         hint = 'Typed, but not entered yet: press Enter' if draft else ''
         if truth_m is None and offered is not None:
             truth_m = offered.x_m, None, offered.z_m
             hint = hint or 'Mark %s: press Enter to accept it' % offered.name
-        self._stored = {name: _text_of(value_m, self.unit) for name, value_m in zip('xyz', truth_m or (None,) * 3)}
+        self._stored = {name: _text_of(value_m) for name, value_m in zip('xyz', truth_m or (None,) * 3)}
         for name, field in self.fields.items():
             field.setText(draft.get(name, '' if draft else self._stored[name]))
         self._show_hint(hint)
         self.preview()
 
     def texts(self):
-        """Text of the fields and the unit: {name: text}."""
-        return dict({name: field.text() for name, field in self.fields.items()}, unit=self.unit)
+        """Text of the fields: {name: text}."""
+        return {name: field.text() for name, field in self.fields.items()}
 
     def begin(self):
         self.fields['x'].setFocus()
@@ -85,13 +72,7 @@ class TruthPanel(QtWidgets.QGroupBox):
         """Emit `typed` immediately instead of after a pause."""
         self._timer.stop()
         texts = self.texts()
-        edited = any(texts[name] != self._stored[name] for name in self.fields)
-        self.typed.emit(texts if edited and any(texts[name] for name in self.fields) else {})
-
-    def switch_unit(self):
-        """Switch between millimetres and metres. Complete lengths are converted."""
-        self.unit_box.setCurrentIndex(1 - self.unit_box.currentIndex())
-        self._on_unit()
+        self.typed.emit(texts if texts != self._stored and any(texts.values()) else {})
 
     def show_problem(self, text):
         self._show_hint(text, 'color: %s; font-weight: bold' % WARNING)
@@ -103,7 +84,7 @@ class TruthPanel(QtWidgets.QGroupBox):
             if name == 'y' and not field.text().strip():
                 continue
             try:
-                values_m[name] = parse_length(field.text(), self.unit)
+                values_m[name] = parse_length(field.text())
             except ValueError as error:
                 raise ValueError('%s: %s' % (name.upper(), error if field.text().strip() else 'a length is missing'))
         return values_m['x'], values_m['z'], values_m.get('y')
@@ -115,7 +96,6 @@ class TruthPanel(QtWidgets.QGroupBox):
             self.fields[name].setMinimumWidth(60)
             self.fields[name].setAccessibleName(label.replace('&', ''))
         self.fields['y'].setPlaceholderText('optional')
-        form.addRow('&Unit', self.unit_box)
         self.error_label.setWordWrap(True)
         self.error_label.setTextFormat(QtCore.Qt.RichText)
         self.hint_label.setWordWrap(True)
@@ -124,20 +104,6 @@ class TruthPanel(QtWidgets.QGroupBox):
 
     def _on_typed(self):
         self._show_hint('')
-        self.preview()
-        self._timer.start()
-
-    def _on_unit(self, _index=None):
-        """Convert the fields from the previous unit to the current unit."""
-        unit = self.unit
-        other = UNITS[1 - UNITS.index(unit)]
-        for name, field in self.fields.items():
-            try:
-                length_m = parse_length(field.text(), other)
-            except ValueError:
-                continue  # incomplete text is kept
-            field.setText(_text_of(length_m, unit))
-        self.unit_changed.emit()
         self.preview()
         self._timer.start()
 
@@ -171,14 +137,13 @@ class TruthPanel(QtWidgets.QGroupBox):
         self.hint_label.setText(text)
 
 
-def error_text(error_m, unit):
+def error_text(error_m):
     """Text of errors (x, z) in metres, or of None."""
     if error_m is None:
         return 'Error: –'
     return 'Error: <b>X %s, Z %s</b>, distance %s' % (
-        length_text(error_m[0], unit, True), length_text(error_m[1], unit, True),
-        length_text(math.hypot(*error_m[:2]), unit))
+        length_text(error_m[0], True), length_text(error_m[1], True), length_text(math.hypot(*error_m[:2])))
 
 
-def _text_of(length_m, unit):
-    return '' if length_m is None else '%.10g' % round(length_m / METRES[unit], 6)
+def _text_of(length_m):
+    return '' if length_m is None else '%.10g' % round(1000 * length_m, 6)

@@ -1,38 +1,35 @@
-"""Random invalid messages, determined by a seed. All of them can be serialized."""
+"""Valid messages, and copies of them with random faults, determined by a seed. All of them can be serialized."""
 import copy
 import random
 
 import genpy
 import numpy as np
-from geometry_msgs.msg import (Point, Pose, PoseWithCovariance, Quaternion, Transform, TransformStamped, Twist,
-                               Vector3)
-from sensor_msgs.msg import CompressedImage, LaserScan, PointField, RegionOfInterest
-from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
+from geometry_msgs.msg import Point, Pose, Quaternion, Transform, TransformStamped, Twist, Vector3
+from sensor_msgs.msg import CompressedImage, Image, LaserScan
+from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.camera.distortion import MODELS
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, CameraFrame, messages_of
-from ros_3d_bb.conversions.image_msgs import LAYOUTS
+from ros_3d_bb.conversions.image_msgs import fill_image
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg,
                                                    time_from)
 from ros_3d_bb.conversions.planner_msgs import points_to_msg
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject, TrackedObjectArray
+from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
 from support.compressed import compressed_fields
+from support.masterless import on_the_wire
+from support.planners import person
 
 FLOATS = (0.0, -0.0, 1.0, -1.0, 0.5, 3.0, float('nan'), float('inf'), -float('inf'), 1e308, -1e308, 5e-324, 1e-30, 1e6)
-INT32 = (0, 1, -1, 3, 10, 47, 48, 63, 64, 65, 1000, 2 ** 31 - 1, -2 ** 31)
-UINT32 = (0, 1, 2, 47, 48, 64, 65535, 2 ** 31, 2 ** 32 - 1)
-TEXTS = ('', 'camera', 'map', '/camera', 'no_such_frame', 'a b', '\u00e4\u0661', 'x' * 1000, '%s%n', "'; --", 'a=b;c')
-NAMES = ('person', 'dog', '', 'a;b', 'x' * 65, '\u9f8d', 'do\x07g')
-SCORES = ('0.5', '0', '1', '1.5', '-1', 'nan', 'inf', '1e400', '', 'high', '\u0661')
+INTEGERS = (0, 1, -1, 3, 7, 8, 10, 47, 48, 63, 64, 65, 255, 1000, 65535, 2 ** 31)  # and the limits of each type
+TEXTS = ('', 'camera', 'map', '/camera', 'no_such_frame', 'a b', '\u00e4\u0661', 'x' * 1000, '%s%n', "'; --", 'a=b;c',
+         'dog', 'do\x07g', ';classes=dog,', ';scores=nan', 'stamp=1.000000000;stamp=x', 'rgb8', '16UC1', 'bayer_rggb8',
+         'jpeg', 'plumb_bob', 'equidistant')
 WIDTH, HEIGHT = 64, 48
-CODECS = {COLOR_TOPIC: ('jpeg', 'png'), DEPTH_TOPIC: ('png', 'compressedDepth', 'compressedDepth rvl')}
-FORMATS = ('jpeg', 'png', 'rgb8; jpeg compressed bgr8', 'bayer_rggb8; png compressed ', '16UC1; png compressed ',
-           '16UC1; compressedDepth', '16UC1; compressedDepth rvl', '32FC1; compressedDepth',
-           '32FC1; compressedDepth rvl')
+CODECS = {COLOR_TOPIC: ('jpeg', 'png'), DEPTH_TOPIC: ('png', 'compressedDepth', 'compressedDepth rvl', 'metres')}
+CODECS['~depth'] = CODECS[DEPTH_TOPIC]
 CAMERA = Camera(WIDTH, HEIGHT, 60.0, 60.0, 31.5, 23.5)
 
 
@@ -47,15 +44,6 @@ class Source(random.Random):
         """A float."""
         return self.choice(FLOATS) if self.random() < 0.4 else self.gauss(0, 3)
 
-    def numbers(self, count):
-        """Several floats."""
-        return [self.number() for _number in range(count)]
-
-    def score(self):
-        """A float32 that mostly is a score."""
-        with np.errstate(over='ignore'):
-            return float(np.float32(self.random() if self.random() < 0.5 else self.number()))
-
     def bytes_of(self, count):
         """At most 65536 bytes."""
         start = self.randrange(max(1, len(self.noise) - count))
@@ -67,10 +55,6 @@ class Source(random.Random):
             return time_from(now_ns)
         return self.choice((genpy.Time(), time_from(now_ns + 10 * NS), time_from(now_ns - NS // 2),
                             time_from(now_ns - 5 * NS), genpy.Time(2 ** 32 - 1, NS - 1), genpy.Time(0, 1)))
-
-    def header(self, now_ns):
-        """A header, mostly with the frame of the camera."""
-        return Header(stamp=self.stamp(now_ns), frame_id='camera' if self.random() < 0.8 else self.choice(TEXTS))
 
 
 def good_messages(stamp_ns):
@@ -84,7 +68,7 @@ def good_messages(stamp_ns):
     messages[BOXES_TOPIC] = boxes2d_to_msg(np.array([[26, 8, 38, 44]]), header)
     box = BoundingBox3D(center=Pose(Point(0, 0, 3), Quaternion(w=1)), size=Vector3(0.5, 1.7, 0.5))
     messages[BOXES3D_TOPIC] = BoundingBox3DArray(header=header, boxes=[box])
-    messages[TRACKS_TOPIC] = TrackedObjectArray(header=header)
+    messages[TRACKS_TOPIC] = TrackedObjectArray(header=header, objects=[person(1, 2.0, 0.0)])
     messages['~scan'] = LaserScan(header=header, angle_increment=0.1, ranges=[1.0, 2.0, 3.0])
     messages['~points'] = points_to_msg(np.ones((3, 3)), header)
     messages['~depth'], messages['~camera_info'] = messages[DEPTH_TOPIC], messages[INFO_TOPICS[0]]
@@ -102,158 +86,69 @@ def transforms(stamp_ns):
     return message
 
 
-def makers(source, now_ns, good, compressed_share=0.0):
-    """{topic: function that makes an invalid message}; `good` are the messages of a valid image."""
-    def image_on(topic):
-        is_compressed = source.random() < compressed_share
-        return (compressed_image(source, now_ns, good[topic], source.choice(CODECS[topic])) if is_compressed
-                else image(source, now_ns, good[topic]))
-    return {INFO_TOPICS[0]: lambda: camera_info(source, now_ns, good[INFO_TOPICS[0]]),
-            DEPTH_TOPIC: lambda: image_on(DEPTH_TOPIC), COLOR_TOPIC: lambda: image_on(COLOR_TOPIC),
-            BOXES_TOPIC: lambda: boxes2d(source, now_ns), BOXES3D_TOPIC: lambda: boxes3d(source, now_ns),
-            TRACKS_TOPIC: lambda: tracks(source, now_ns),
-            '~scan': lambda: LaserScan(header=source.header(now_ns), angle_min=source.score(),
-                                       angle_increment=source.score(),
-                                       ranges=[source.score() for _beam in range(source.choice((0, 3)))]),
-            '~points': lambda: cloud(source, now_ns), '~depth': lambda: image_on(DEPTH_TOPIC),
-            '~camera_info': lambda: camera_info(source, now_ns, good[INFO_TOPICS[0]]),
-            'cmd_vel_in': lambda: Twist(Vector3(*source.numbers(3)), Vector3(*source.numbers(3)))}
+def damaged(source, topic, message, now_ns):
+    """A copy of a valid message of a topic, in which up to two fields of it or of its parts have other values.
 
-
-def image(source, now_ns, good):
-    """A mostly damaged copy of a valid image."""
-    message = copy.copy(good)
-    message.header = source.header(now_ns)
-    _damage(source, message, (
-        lambda: {'encoding': source.choice(tuple(LAYOUTS) + TEXTS)},
-        lambda: {'step': source.choice(UINT32 + (max(message.step, 1) - 1, min(message.step, 2 ** 31) + 1))},
-        lambda: {'data': message.data[:source.randrange(len(message.data) + 1)]},
-        lambda: {'width': source.choice(UINT32)},
-        lambda: {'height': source.choice(UINT32)},
-        lambda: {'is_bigendian': source.choice((1, 255))},
-        lambda: {'data': source.bytes_of(len(message.data))},
-        lambda: _extreme_pixels(source, message.height % 64, message.width % 64)))
-    return message
-
-
-def compressed_image(source, now_ns, good, codec):
-    """A mostly damaged compressed copy of a valid image."""
-    message = CompressedImage(**dict(compressed_fields(good, codec), header=source.header(now_ns)))
-
-    def other_bytes():
-        at, count = source.randrange(len(message.data) + 1), source.choice((1, 2, 4, 40))
-        return {'data': message.data[:at] + source.bytes_of(count) + message.data[at + count:]}
-
-    _damage(source, message, (
-        other_bytes,
-        lambda: {'format': source.choice(FORMATS + tuple(LAYOUTS) + TEXTS)},
-        lambda: {'data': message.data[:source.randrange(len(message.data) + 1)]},
-        lambda: {'data': source.bytes_of(len(message.data))}))
-    return message
-
-
-def _extreme_pixels(source, height, width):
-    values = np.array([source.choice(FLOATS) for _column in range(16)])
-    with np.errstate(over='ignore'):
-        pixels = np.resize(values.astype(np.float32), (height, width))
-    return {'height': height, 'width': width, 'encoding': '32FC1', 'step': 4 * width, 'data': pixels.tobytes()}
-
-
-def camera_info(source, now_ns, good):
-    """A mostly damaged copy of a valid camera_info."""
-    message = copy.copy(good)
-    message.header = source.header(now_ns)
-
-    def other_matrix():
-        matrix = list(message.K)
-        matrix[source.randrange(9)] = source.number()
-        return {'K': matrix}
-
-    _damage(source, message, (
-        other_matrix,
-        lambda: {'width': source.choice(UINT32)},
-        lambda: {'height': source.choice(UINT32)},
-        lambda: {'distortion_model': source.choice(tuple(MODELS) + TEXTS)},
-        lambda: {'D': source.numbers(source.choice((0, 1, 4, 5, 8, 12, 14, 100)))}))
-    return message
-
-
-def _damage(source, message, faults):
-    """Replace fields of a message by those of up to two faults, functions that return {field: value}."""
+    Images may be compressed before, or be depth in metres with extreme values.
+    """
+    if topic in CODECS and source.random() < 0.5:
+        message = _in_another_form(source, message, source.choice(CODECS[topic]))
+    message = on_the_wire(message)
     for _fault in range(source.choice((0, 1, 1, 2))):
-        for name, value in source.choice(faults)().items():
-            setattr(message, name, value)
-
-
-def boxes2d(source, now_ns):
-    """2D boxes."""
-    count = 10 ** 6 if source.random() < 0.0002 else source.choice((0, 1, 2, 3, 4, 4, 4, 4, 8, 8, 12, 13, 400, 4004))
-    if count > 400:
-        return Int32MultiArray(data=[source.choice(INT32)] * count)
-    message = Int32MultiArray(data=[source.choice(INT32) if source.random() < 0.5 else source.randrange(-5, 70)
-                                    for _number in range(count)])
-    if source.random() < 0.8:
-        stamp = source.stamp(now_ns)
-        label = 'boxes;stamp=%d.%09d;frame=%s' % (stamp.secs, stamp.nsecs, source.choice(TEXTS))
-        if source.random() < 0.5:
-            label += ';classes=' + ','.join(source.choice(NAMES) for _box in range(source.choice((1, count // 4))))
-            label += ';scores=' + ','.join(source.choice(SCORES) for _box in range(source.choice((1, count // 4))))
-        if source.random() < 0.2:
-            label = source.choice((label[:source.randrange(len(label))], 'boxes;stamp=%s.000000000' % ('9' * 100),
-                                   'boxes;stamp=\u0661.' + 9 * '\u00b2', ';' * 50, 'stamp=1.000000000;stamp=x') + TEXTS)
-        message.layout.dim = [MultiArrayDimension(label=label, size=source.choice(UINT32))]
-        message.layout.data_offset = source.choice(UINT32)
+        part, name, kind = source.choice(list(_fields(message)))
+        setattr(part, name, _other(source, kind, getattr(part, name), now_ns))
     return message
 
 
-def boxes3d(source, now_ns):
-    """3D boxes."""
-    message = BoundingBox3DArray(header=source.header(now_ns))
-    for _box in range(source.choice((0, 1, 1, 2, 5))):
-        position = Point(source.gauss(0, 1), source.gauss(0, 0.3), abs(source.gauss(3, 1)))
-        box = BoundingBox3D(support=float(np.float32(source.random())), truncated=source.random() < 0.3,
-                            center=Pose(position, Quaternion(w=1)), size=Vector3(0.5, 1.7, 0.5))
-        _damage(source, box, (
-            lambda: {'center': Pose(Point(*source.numbers(3)), Quaternion(w=1))},
-            lambda: {'center': Pose(position, Quaternion(*source.numbers(4)))},
-            lambda: {'size': Vector3(*source.numbers(3))},
-            lambda: {'position_covariance': source.numbers(9)},
-            lambda: {'label': source.choice(NAMES + TEXTS), 'score': source.score()},
-            lambda: {'roi': RegionOfInterest(*[source.choice(UINT32) for _edge in range(4)], False)}))
-        message.boxes.append(box)
-    return message
+def _in_another_form(source, image, codec):
+    if codec != 'metres':
+        return CompressedImage(**compressed_fields(image, codec))
+    with np.errstate(over='ignore'):
+        values = np.array([source.choice(FLOATS) for _column in range(16)]).astype(np.float32)
+    return fill_image(Image(header=image.header), np.resize(values, (image.height, image.width)), '32FC1')
 
 
-def cloud(source, now_ns):
-    """A mostly damaged point cloud."""
-    message = points_to_msg(np.array(source.numbers(9)).reshape(3, 3).clip(-1e30, 1e30), source.header(now_ns))
-    _damage(source, message, (
-        lambda: {'height': source.choice(UINT32)}, lambda: {'width': source.choice(UINT32)},
-        lambda: {'point_step': source.choice(UINT32)}, lambda: {'row_step': source.choice(UINT32)},
-        lambda: {'data': source.bytes_of(source.choice((0, 1, 36)))}, lambda: {'is_bigendian': True},
-        lambda: {'fields': [PointField(name, source.choice(UINT32), source.choice((7, 8)), 1) for name in 'xyz']}))
-    return message
+def _fields(message):
+    """Yield (part, name, type) for each field of a message and of its parts."""
+    for name, kind in zip(message.__slots__, message._slot_types):
+        yield message, name, kind
+        value = getattr(message, name)
+        for part in value if isinstance(value, list) else [value]:
+            if isinstance(part, genpy.Message):
+                for field in _fields(part):
+                    yield field
 
 
-def tracks(source, now_ns):
-    """Tracks."""
-    message = TrackedObjectArray(header=source.header(now_ns))
-    for _track in range(source.choice((0, 1, 2))):
-        track = TrackedObject(
-            id=source.choice(UINT32), status=source.choice((0, 1, 2, 3, 255)), moving=source.random() < 0.5,
-            size=Vector3(0.5, 0.5, 1.7),
-            prediction_step=source.choice((genpy.Duration(0, NS // 4), genpy.Duration(), genpy.Duration(-5),
-                                           genpy.Duration(2 ** 31 - 1))),
-            prediction=[PoseWithCovariance() for _step in range(source.choice((0, 1, 8)))])
-        if source.random() < 0.5:
-            part = source.choice((track.pose.pose.position, track.twist.twist.linear, track.size)
-                                 + tuple(pose.pose.position for pose in track.prediction))
-            part.x, part.y, part.z = source.numbers(3)
-        if source.random() < 0.3:
-            track.label, track.score = source.choice(NAMES + TEXTS), source.score()
-        if source.random() < 0.3:
-            track.pose.covariance, track.twist.covariance = source.numbers(36), source.numbers(36)
-        for pose in track.prediction if source.random() < 0.3 else ():
-            pose.covariance = source.numbers(36)
-        message.objects.append(track)
-    return message
+def _other(source, kind, value, now_ns):
+    """Another value of a field of a type such as `float64[9]`."""
+    if kind.endswith(']'):
+        return _other_array(source, kind, value, now_ns)
+    if '/' in kind:
+        return type(value)()  # an empty message
+    if kind == 'string':
+        return source.choice(TEXTS + (value[:source.randrange(len(value) + 1)], value + source.choice(TEXTS)))
+    if kind == 'time':
+        return source.stamp(now_ns)
+    if kind == 'duration':
+        return source.choice((genpy.Duration(), genpy.Duration(-5), genpy.Duration(2 ** 31 - 1)))
+    if kind.startswith('float'):
+        with np.errstate(over='ignore'):
+            return float(np.float32(source.number())) if kind == 'float32' else source.number()
+    if 'int' in kind:
+        bits = int(kind.lstrip('uint'))
+        low, high = (0, 2 ** bits - 1) if kind.startswith('u') else (-2 ** (bits - 1), 2 ** (bits - 1) - 1)
+        numbers = INTEGERS + (low, high, value - 1, value + 1)
+        return source.choice([number for number in numbers if low <= number <= high])
+    return not value
+
+
+def _other_array(source, kind, value, now_ns):
+    """Other bytes; or one other element, or fewer or more elements, unless the length is a part of the type."""
+    at = source.randrange(len(value) + 1)
+    if isinstance(value, bytes):
+        other = source.bytes_of(source.choice((1, 4, 40)))
+        return source.choice((value[:at], source.bytes_of(len(value)), value[:at] + other + value[at + len(other):]))
+    element, _bracket, length = kind.partition('[')
+    if at < len(value) and (length != ']' or source.random() < 0.5):
+        return list(value[:at]) + [_other(source, element, value[at], now_ns)] + list(value[at + 1:])
+    return list(value[:at]) * source.choice((1, 2, 100)) if length == ']' else value

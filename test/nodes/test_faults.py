@@ -43,10 +43,14 @@ def pipeline_stage():
 @pytest.fixture
 def stage(pipeline_stage):
     """All people of the first scene are tracked."""
-    pipeline_stage.scene = 0
-    pipeline_stage.recovered('(before the fault)', 60)
-    pipeline_stage.rows.pop()
+    track_the_first_scene(pipeline_stage)
     return pipeline_stage
+
+
+def track_the_first_scene(stage):
+    stage.scene = 0
+    stage.recovered('(before the fault)', 60)
+    stage.rows.pop()
 
 
 def send_images(stage, count, pause_s, without=()):

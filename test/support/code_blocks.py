@@ -6,9 +6,9 @@ from typing import NamedTuple
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 # Pages with blocks that are run. Other pages of doc/ have none, or tests of their own.
 PAGES = ('README.md',) + tuple('doc/%s.md' % name for name in (
-    'bags', 'benchmarks', 'cameras', 'campaign', 'container', 'detectors', 'faults', 'installing', 'jackal',
-    'migrating', 'onnx', 'other_cameras', 'planner_outputs', 'planners', 'questions', 'realsense', 'robot', 'rviz',
-    'security', 'simulation', 'topics', 'troubleshooting', 'tuning'))
+    'bags', 'benchmark_methods', 'benchmarks', 'cameras', 'campaign', 'container', 'detectors', 'faults', 'installing',
+    'jackal', 'migrating', 'onnx', 'other_cameras', 'planner_outputs', 'planners', 'questions', 'realsense', 'robot',
+    'rviz', 'security', 'simulation', 'topics', 'troubleshooting', 'tuning'))
 
 
 class Block(NamedTuple):

@@ -57,7 +57,7 @@ def outputs_of(head, boxes, scores, input_hw, strides=(8, 16, 32), bins=8):
 def distributions(distances, bins):
     """Values before the softmax, (n, 4 * bins), of distributions whose expected values are distances (n, 4)."""
     offsets = np.clip(distances, 0, bins - 1)[..., None] - np.arange(bins)
-    return np.log(np.clip(1 - np.abs(offsets), 1e-9, 1)).reshape(len(distances), -1)
+    return np.log(np.clip(1 - np.abs(offsets), 1e-9, 1)).reshape(len(distances), 4 * bins)
 
 
 def write_mean_network(path, input_shape=(1, 3, 96, 128), element=FLOAT, channels_last=False, metadata=()):

@@ -189,6 +189,10 @@ def test_depths_beyond_any_camera_are_ignored():
     assert box.center_m[2] == pytest.approx(2.0 + PERSON_CLASS.axis) and box.support == 1
 
 
+def test_depths_of_less_than_a_millimetre_give_no_box():
+    assert foreground(flat(1e-5, 1.0, np.float32), (5, 5, 60, 45)) is None
+
+
 @pytest.mark.parametrize('name', ['foreground', 'median'])
 def test_boxes_are_in_the_order_of_their_rectangles(name):
     depth = flat(5000)

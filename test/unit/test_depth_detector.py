@@ -4,14 +4,17 @@ import numpy as np
 import pytest
 
 from conftest import DATA
-from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.camera_model import Camera, transform_points
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.depth import detector as depth_people
 from ros_3d_bb.detection.depth.detector import DepthPeople
-from ros_3d_bb.detection.depth.ground_plane import Floor
+from ros_3d_bb.detection.depth.ground_plane import Floor, floor_from_transform
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams, find_person_clusters, grid_of
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
+from ros_3d_bb_lab.evaluation.defaults import scenario_path
+from ros_3d_bb_lab.simulation.scenario import read_scenario
+from ros_3d_bb_lab.simulation.simulator import Simulator
 
 CAMERA = Camera(640, 480, 600.0, 600.0, 319.5, 239.5)
 # (lowest, highest, to the right, nearer, half the width, shade), metres: a person in mid-stride, facing the camera
@@ -103,6 +106,21 @@ def test_the_box_of_a_person_extends_from_head_to_feet(height_m, x, z, camera, f
     detections = room.detections(floor, in_metres)
     assert_boxes(detections.boxes, expected, 0.8 if z != 2.0 else 0.7)
     assert 0.7 <= detections.scores[0] <= 1 and detections.classes.tolist() == [0]
+
+
+@pytest.mark.parametrize('number', [100, 217, 246, 285])
+def test_the_box_of_a_person_whose_legs_are_behind_another_extends_to_the_floor(number):
+    """In images of the demo, in which two people walk in front of the fourth one."""
+    simulator = Simulator(read_scenario(scenario_path('demo')))
+    frame = simulator.frame(number)
+    camera_from_map = np.linalg.inv(frame.poses.map_from_camera)
+    person, = [person for person in frame.people if person.id == 4]
+    feet_m = transform_points(camera_from_map, np.append(person.position_m[:2], 0))
+    boxes = DepthPeople().detect(frame.color, DepthImage(frame.depth_mm, 0.001), simulator.camera,
+                                 floor_from_transform(camera_from_map)).boxes
+    overlaps = iou(person.box_px, boxes)
+    assert overlaps.max() > 0.6
+    assert boxes[overlaps.argmax(), 3] == pytest.approx(simulator.camera.project(feet_m[None])[0, 1], abs=3)
 
 
 @pytest.mark.parametrize('one, other', [((0.0, 3.0), (0.4, 3.5)), ((0.0, 3.0), (0.4, 3.7)), ((0.0, 3.0), (0.4, 4.0)),

@@ -60,7 +60,7 @@ ALLOWED = {
     'ros_3d_bb_lab.evaluation.noise': (
         'camera core estimation sessions tracking lab.evaluation lab.evaluation.tracking', 'matplotlib scipy'),
     'ros_3d_bb_lab.evaluation.tracking': (
-        'camera core estimation tracking lab.evaluation.baselines',
+        'camera core estimation tracking lab.evaluation lab.evaluation.baselines',
         'scipy trackeval'),
     'ros_3d_bb_lab.evaluation.demo': (
         'conversions core tracking visualization lab.evaluation lab.simulation.ros',
@@ -69,9 +69,8 @@ ALLOWED = {
         'camera conversions core msg nodes.common tracking lab.evaluation lab.simulation lab.simulation.ros',
         'geometry_msgs nav_msgs rospy sensor_msgs std_msgs tf2_msgs yaml'),
     'ros_3d_bb_lab.evaluation.costmap': (
-        'camera conversions core estimation msg tracking visualization lab.evaluation '
-        'lab.simulation lab.simulation.ros',
-        'cv2 nav_msgs rosgraph_msgs rospy sensor_msgs std_msgs tf2_msgs'),
+        'camera conversions core estimation msg tracking lab.evaluation lab.simulation lab.simulation.ros',
+        'nav_msgs rosgraph_msgs rospy sensor_msgs std_msgs tf2_msgs'),
     'ros_3d_bb_lab.evaluation.gazebo': (
         'bags conversions core tracking lab.evaluation lab.simulation', 'rosbag tf2_msgs'),
     'ros_3d_bb_lab.evaluation.latency': (

@@ -68,7 +68,7 @@ def test_unusable_data_is_named(monkeypatch, tmp_path, text, message):
     if text is not None:
         (tmp_path / 'walking').mkdir()
         (tmp_path / 'walking' / '1.csv').write_text(text)
-    with pytest.raises(SystemExit, match=message):
+    with pytest.raises(ValueError, match=message):
         run_command(monkeypatch, '--data', str(tmp_path))
 
 

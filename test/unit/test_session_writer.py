@@ -13,7 +13,7 @@ from ros_3d_bb.core import atomic_file
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.sessions import session_writer
-from ros_3d_bb.sessions.frame_synchronizer import ColorImage, Snapshot
+from ros_3d_bb.sessions.snapshots import ColorImage, Snapshot
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb.sessions.session_writer import append, remove
 

@@ -5,7 +5,7 @@ import pytest
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import Box3D
-from ros_3d_bb.sessions.frame_synchronizer import ColorImage, Snapshot
+from ros_3d_bb.sessions.snapshots import ColorImage, Snapshot
 from ros_3d_bb.visualization.image_overlay import BOX_COLOR, colorize_depth
 from ros_3d_bb.visualization.viewer_layout import RATE_WINDOW_NS, FrameRate, box_lines, compose
 

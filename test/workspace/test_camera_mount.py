@@ -1,10 +1,14 @@
 """Cameras that are rotated, tilted, or without tf: the same positions as from an upright camera on a robot."""
+import argparse
+import re
+
 import numpy as np
 import pytest
 import rosbag
 import roslaunch
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.bag_writer import write_bag
@@ -12,17 +16,21 @@ from ros_3d_bb.bags.process_bag import _parser, _settings_from, main
 from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.camera.image_rotation import mounted_camera, turned_camera, turned_image, turned_rotation
-from ros_3d_bb.conversions.camera_msgs import START_NS, CameraFrame, image_messages_of, messages_of
+from ros_3d_bb.conversions.camera_msgs import (DEPTH_TOPIC, INFO_TOPICS, START_NS, CameraFrame, image_messages_of,
+                                               messages_of, transform_messages)
 from ros_3d_bb.conversions.image_msgs import fill_image
-from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, time_from, tracks_from_msg
+from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, time_from, tracks_from_msg, transform_from_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import Detections
+from ros_3d_bb.nodes.camera_pose_node import CameraPoseNode
+from ros_3d_bb.nodes.doctor import bag_findings
 from ros_3d_bb.pipeline.detection_stage import CameraRotation, Yolov5NodeParams, detect_in_color
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
 from support.launching import loaded
+from support.masterless import masterless
+from support.rolled_camera import FRAME, HEIGHT_M, ROLL_RAD, TILT_RAD, RolledSimulator
 
-HEIGHT_M, TILT_RAD, FRAME = 1.2, 0.1, 'camera_color_optical_frame'
 SCENE = {'duration': 0.8, 'rate': 10.0, 'robot': {'mount': [0.0, 0.0, HEIGHT_M - 0.065], 'pitch': TILT_RAD},
          'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}, {'start': [4.0, -0.8], 'facing': 2.0}]}
 
@@ -65,6 +73,15 @@ def positions_and_sizes(found):
 
 
 @pytest.fixture(scope='module')
+def rolled(tmp_path_factory):
+    """Folder with a bag of a RolledSimulator, and the true positions (n, 2) of the people in its last image."""
+    simulator, folder = RolledSimulator(), tmp_path_factory.mktemp('rolled')
+    frames = [simulator.frame(number) for number in range(simulator.frame_count)]
+    write_bag(map(simulator.messages, frames), str(folder / 'in.bag'))
+    return folder, np.array([person.position_m[:2] for person in frames[-1].people])
+
+
+@pytest.fixture(scope='module')
 def upright(recorded, tmp_path_factory):
     folder = tmp_path_factory.mktemp('upright')
     recorded(folder / 'in.bag')
@@ -92,12 +109,124 @@ def test_height_tilt_and_rotation_replace_tf(recorded, upright, tmp_path, turns)
     np.testing.assert_allclose(positions_and_sizes(found), positions_and_sizes(upright), atol=0.01)
 
 
+def test_the_roll_of_a_camera_is_given_or_fitted_to_the_floor(rolled):
+    """The same people, at their true positions, and more of them than without the roll."""
+    folder, truth_m = rolled
+    given = '--camera-height', str(HEIGHT_M), '--camera-tilt', str(TILT_RAD)
+    found = {options: processed(folder, *options)[0] for options in (
+        given, given + ('--camera-roll', str(ROLL_RAD)), ('--camera-pose', 'floor'))}
+    without, with_roll, fitted = (sum(len(boxes2d_from_msg(message).boxes) for message in found[options][
+        '/yolo_bounding_box']) for options in found)
+    assert abs(fitted - with_roll) <= 3 and min(fitted, with_roll) > 1.3 * without
+    for options in list(found)[1:]:
+        last = tracks_from_msg(found[options]['/ros_3d_bb/tracks'][-1])
+        tracks_m = np.array([track.position_m[:2] for track in last])
+        apart_m = np.linalg.norm(tracks_m[:, None] - truth_m, axis=2)
+        assert apart_m.shape == (3, 3) and apart_m.min(axis=0).max() < 0.15, options
+
+
+def doctor_on(path):
+    """The facts and faults {subject: text} that the doctor finds in a bag, and the next command."""
+    given = argparse.Namespace(bag=str(path), camera='', target_frame='', depth='aligned')
+    found, command, _purpose = bag_findings(given)
+    return {finding.subject: finding.fault or finding.fact for finding in found}, command
+
+
+def test_the_doctor_fits_height_tilt_and_roll_to_the_floor(rolled):
+    found, command = doctor_on(rolled[0] / 'in.bag')
+    assert 'image rotation' not in found
+    options = re.search(r'--camera-height (\S+) --camera-tilt (\S+) --camera-roll (\S+)', command)
+    height_m, *angles_rad = map(float, options.groups())
+    assert height_m == pytest.approx(HEIGHT_M, abs=0.05)
+    assert angles_rad == pytest.approx([TILT_RAD, ROLL_RAD], abs=np.radians(1))
+    assert found['floor'].startswith('the camera is %.2f m above it' % height_m)
+
+
+@pytest.mark.parametrize('turns, late_ns', [(1, 0), (2, 0), (3, 0), (3, 20000000)])
+def test_the_doctor_notices_a_rotated_camera_without_tf(recorded, tmp_path, turns, late_ns):
+    """Whether or not its colour and depth images have the same stamps."""
+    recorded(tmp_path / 'same.bag', turns, with_tf=False)
+    with rosbag.Bag(str(tmp_path / 'same.bag')) as before, rosbag.Bag(str(tmp_path / 'in.bag'), 'w') as after:
+        for topic, message, time in before.read_messages():
+            if topic == '/' + DEPTH_TOPIC:
+                message.header.stamp = time = time_from(time.to_nsec() + late_ns)
+            after.write(topic, message, time)
+    found, command = doctor_on(tmp_path / 'in.bag')
+    assert 'turned clockwise by %d degrees' % (90 * turns) in found['image rotation']
+    options = re.search(r'--camera-height (\S+) --camera-tilt (\S+) --image-rotation (\d+)', command)
+    assert list(map(float, options.groups())) == pytest.approx([HEIGHT_M, TILT_RAD, 90 * turns], abs=0.02)
+
+
+class PoseRig(object):
+    """camera_pose_node, and images of the standing person of `recorded`, four in a second."""
+
+    def __init__(self, connections, folder):
+        self.connections, self.node, self.stamp_ns = connections, CameraPoseNode(), START_NS
+        with rosbag.Bag(str(folder / 'in.bag')) as bag:
+            self._messages = {topic: message for topic, message, _time in bag.read_messages()}
+
+    def send(self, count):
+        """Send images. Returns the published TransformStamped; None without one."""
+        for _image in range(count):
+            self.stamp_ns += NS // 4
+            for name in INFO_TOPICS[0], DEPTH_TOPIC:
+                message = self._messages['/' + name]
+                message.header.stamp = time_from(self.stamp_ns)
+                if not self.connections.subscribers[name].unregister.called:
+                    self.connections.send(name, message)
+        message = self.connections.publishers['/tf_static'].newest
+        return None if message is None else message.transforms[0]
+
+    def add_transform(self, parent, child, pose):
+        """Send a transform of the driver."""
+        self.connections.send('/tf', TFMessage(transform_messages(time_from(START_NS), [(parent, child, pose)])))
+
+
+def assert_same_pose(pose, expected):
+    """Within 0.05 m and 1 degree."""
+    between = np.linalg.inv(expected).dot(pose)
+    assert np.linalg.norm(between[:3, 3]) < 0.05
+    assert np.arccos(min((np.trace(between[:3, :3]) - 1) / 2, 1)) < np.radians(1)
+
+
+@pytest.mark.parametrize('turns', [0, 1, 2, 3])
+def test_the_node_publishes_the_pose_of_the_floor_once(recorded, tmp_path, turns):
+    recorded(tmp_path / 'in.bag', turns, with_tf=False)
+    with masterless({'image_rotation': str(90 * turns)}) as connections:
+        rig = PoseRig(connections, tmp_path)
+        assert rig.send(7) is None
+        link = rig.send(5)
+        assert connections.publishers['/tf_static'].count == 1
+        assert all(connections.subscribers[name].unregister.called for name in (INFO_TOPICS[0], DEPTH_TOPIC))
+    assert (link.header.frame_id, link.child_frame_id) == ('map', FRAME)
+    assert_same_pose(transform_from_msg(link), mounted_camera(HEIGHT_M, TILT_RAD, turns))
+
+
+def test_the_pose_is_that_of_the_root_of_the_driver_and_replaces_none(recorded, tmp_path):
+    recorded(tmp_path / 'in.bag', with_tf=False)
+    link_from_camera = transform_from((0.1, 0.02, 0.0), (0.5, -0.5, 0.5, -0.5))
+    with masterless() as connections:
+        rig = PoseRig(connections, tmp_path)
+        rig.add_transform('camera_link', FRAME, link_from_camera)
+        link = rig.send(8)
+    assert (link.header.frame_id, link.child_frame_id) == ('map', 'camera_link')
+    assert_same_pose(transform_from_msg(link).dot(link_from_camera), mounted_camera(HEIGHT_M, TILT_RAD, 0))
+    with masterless() as connections:
+        rig = PoseRig(connections, tmp_path)
+        rig.add_transform('map', FRAME, np.eye(4))
+        assert rig.send(8) is None
+        counts = rig.node._diagnostics.counts
+        assert counts['images processed'] == 8 and counts['depth images rejected'] == 1
+
+
 @pytest.mark.parametrize('options, complaint', [
     ('--target-frame camera_color_optical_frame', 'is an optical frame'),
     ('--camera-height -1', 'more than 0'), ('--camera-height 1 --camera-tilt 2', 'less than pi / 2 rad'),
     ('--camera-height 1 --cameras a,b', 'a single camera only'), ('--camera-tilt 0.1', 'without --camera-height'),
     ('--camera-roll 0.1', 'without --camera-height'), ('--camera-height 1 --camera-roll 1.6', 'less than pi / 4 rad'),
-    ('--image-rotation 45', 'invalid choice')])
+    ('--image-rotation 45', 'invalid choice'), ('--camera-pose wall', 'invalid choice'),
+    ('--camera-pose floor --camera-height 1', 'one of them expected'),
+    ('--camera-pose floor --cameras a,b', 'a single camera only')])
 def test_unusable_mounts_are_rejected(recorded, tmp_path, capfd, options, complaint):
     recorded(tmp_path / 'in.bag', with_tf=False)
     with pytest.raises(SystemExit) as error:
@@ -153,6 +282,18 @@ def test_launch_arguments_publish_the_pose_of_a_camera_alone(degrees):
     assert parameters['/bbox3d_node/image_rotation'] == degrees
 
 
+@pytest.mark.parametrize('launch_file, more', [('pipeline.launch', ()), ('playback.launch', ('bag:=/b.bag',)),
+                                               ('measure.launch', ('session:=/s', 'camera:=true',
+                                                                   'driver:=pyrealsense2'))])
+def test_camera_pose_starts_the_node_and_gives_the_floor(launch_file, more):
+    parameters, nodes = loaded(launch_file, 'detector:=depth', 'camera_pose:=floor', 'image_rotation:=90', *more)
+    assert 'camera_pose' not in nodes and nodes['camera_pose_node'].type == 'camera_pose_node'
+    expected = {'frame_world': 'map', 'frame_id': '', 'image_rotation': '90', 'depth': 'aligned', 'depth_scale': 0.0}
+    assert {key: parameters['/camera_pose_node/' + key] for key in expected} == expected
+    assert parameters['/bbox3d_node/floor_frame'] == parameters['/depth_detector_node/floor_frame'] == 'map'
+    assert parameters['/depth_detector_node/floor_height'] == 0 and parameters['/tracker_node/target_frame'] == 'map'
+
+
 def test_the_transform_that_the_doctor_advises_is_that_of_the_arguments():
     pose, _parent, _child = pose_in('0 0 1.2 -1.5708 0 -1.6708 map optical'.split())
     np.testing.assert_allclose(pose, mounted_camera(1.2, 0.1, 0), atol=1e-4)
@@ -165,6 +306,10 @@ def test_the_transform_that_the_doctor_advises_is_that_of_the_arguments():
     ('jackal.launch', ['driver:=none', 'cameras:=front,rear', 'camera_height:=1.2'], ['cameras', 'camera_height']),
     ('pipeline.launch', ['cameras:=front,rear', 'frame_id:=optical'], ['cameras', 'frame_id']),
     ('pipeline.launch', ['camera_tilt:=0.1'], ['camera_height', 'camera_tilt']),
+    ('pipeline.launch', ['camera_pose:=wall'], ['camera_pose', 'floor']),
+    ('playback.launch', ['bag:=/b.bag', 'camera_pose:=floor', 'camera_height:=1.2'], ['camera_pose', 'camera_height']),
+    ('measure.launch', ['session:=/s', 'camera_pose:=floor', 'camera_tilt:=0.1'], ['camera_height', 'camera_tilt']),
+    ('pipeline.launch', ['cameras:=front,rear', 'camera_pose:=floor'], ['cameras', 'camera_pose']),
     ('pipeline.launch', ['camera_roll:=0.1'], ['camera_height', 'camera_roll']),
     ('measure.launch', ['session:=/s', 'camera_root:=camera_link'], ['camera_height', 'camera_root']),
     ('pipeline.launch', ['detector:=yolo5'], ['detector', 'yolo5']),

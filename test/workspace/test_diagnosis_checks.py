@@ -86,6 +86,8 @@ CASES = [
      'rgb8'),
     (with_stream(DEPTH, stamps_ns=(), lag_s=None), 'stamps', 'no stamp (zero)', 'set it to the time'),
     (with_stream(DEPTH, stamps_ns=STAMPS[:40]), 'stamps', '10 of 50 messages', 'set it to the time'),
+    (with_stream(DEPTH, stamps_ns=STAMPS[:1] * 50), 'stamps', '49 of 50 messages on /camera/depth have the stamp',
+     'set it to the time'),
     (with_stream(COLOR, stamps_ns=moved(STAMPS, 2.0 ** 31)), 'stamps', 'the year 2038', 'clock'),
     (with_stream(DEPTH, lag_s=9e6), 'stamps', '104.2 days before ROS time', 'use_sim_time true'),
     (with_stream(DEPTH, lag_s=-9.0), 'stamps', '9.0 s after ROS time', 'chrony'),
@@ -124,6 +126,10 @@ def test_a_working_pipeline_has_no_faults_and_a_fact_of_each_check():
     found = findings(sound())
     assert faults_in(sound()) == []
     assert len(found) > 14 and all(len(finding.lines) == 1 and finding.fact for finding in found)
+
+
+def test_camera_info_needs_no_stamp():
+    assert faults_in(with_stream(INFO, stamps_ns=(), lag_s=None)) == []
 
 
 @pytest.mark.parametrize('seen, subject, fault, fix', CASES)

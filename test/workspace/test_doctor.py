@@ -181,7 +181,25 @@ def test_raw_depth_is_not_taken_for_aligned_depth(bag, tmp_path, change, subject
     again = next_command_in('rosrun ros_3d_bb doctor ' + path, tmp_path)
     assert 'doctor' in again and '--depth raw' in again and 'camera/depth/image_rect_raw:=' + topic in again
     process = next_command_in(again, tmp_path)
-    assert '--detector depth --depth raw' in process and '--camera-height' not in process
+    assert '--detector depth --depth raw' in process and '--camera-' not in process
+
+
+def raw_alone(topic, message):
+    """As raw_only, of a camera that is not on a robot: tf has only the link of its cameras."""
+    topic, message = raw_only(topic, message)
+    if topic == '/tf':
+        message.transforms = message.transforms[-1:]
+    return topic, message
+
+
+def test_the_pose_of_a_raw_camera_alone_is_fitted_to_the_floor(bag, tmp_path):
+    process = 'rosrun ros_3d_bb doctor ' + changed(bag, tmp_path, raw_alone)
+    for _step in range(2):
+        process = next_command_in(process, tmp_path)
+    assert '--detector depth --depth raw' in process and '--camera-pose floor' in process
+    printed = subprocess.run(['bash', '-c', process], cwd=str(tmp_path), stdout=subprocess.PIPE,
+                             universal_newlines=True)
+    assert 'the camera is 0.2' in printed.stdout and 'images with tracks' in printed.stdout
 
 
 def test_there_is_no_next_command_before_a_fault_is_fixed(bag, tmp_path):

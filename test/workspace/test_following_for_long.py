@@ -19,9 +19,9 @@ def longest_s(moments, condition):
     return longest
 
 
-@pytest.mark.parametrize('seconds', [pytest.param(8.0, marks=pytest.mark.slow),
-                                     pytest.param(600.0, marks=pytest.mark.long)])
-def test_the_robot_follows_the_same_person(seconds):
+@pytest.mark.long
+def test_the_robot_follows_the_same_person():
+    seconds = 600.0
     scene = FollowedScene(read_scenario(os.path.join(ROOT, 'config', 'scenarios', 'follow.yaml'))).run(seconds)
     persons = [moment.person for moment in scene.moments]
     print('%g s: on the person in %d of %d images, on others in %d, lost in %d; on another one for at most %.1f s, '

@@ -6,29 +6,14 @@ import subprocess
 import sys
 
 import pytest
-import yaml
 
 from ros_3d_bb_lab.evaluation.launching import free_port
-from support.launching import GAZEBO_ARGUMENTS, RS_CAMERA_ARGUMENTS, stand_in_launch_file, write
 from support.small_session import write_small_session
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 PROGRAMS = sorted(os.path.basename(path) for path in glob.glob(os.path.join(ROOT, 'scripts', '*'))) + ['annotator']
 NODES = [name for name in PROGRAMS if name.endswith('_node')]
 FOLDERS = ('launch', 'config', 'examples', 'rviz', 'msg', 'urdf', 'worlds')
-# Loads launch files, and prints their [nodes, parameters] by name.
-LOAD = """
-import glob, os, sys
-import roslaunch, yaml
-found = {}
-for path in glob.glob(os.path.join(sys.argv[1], '*.launch')):
-    config = roslaunch.config.ROSLaunchConfig()
-    roslaunch.xmlloader.XmlLoader(resolve_anon=False).load(path, config, argv=sys.argv[2:], verbose=False)
-    found[os.path.basename(path)] = [sorted('%s/%s' % (node.package, node.type) for node in config.nodes),
-                                     {name: str(given.value).strip() for name, given in config.params.items()}]
-print(yaml.safe_dump(found))
-"""
-ARGUMENTS = ['weights:=/weights.pt', 'bag:=/some.bag', 'session:=/session', 'record:=/record.json']
 
 
 def built(tmp_path_factory, *options, **environment):
@@ -99,38 +84,6 @@ def test_each_node_starts_and_rejects_an_unknown_parameter(installed, master, na
     output = run_in(installed, 'rosrun ros_3d_bb', name, '_frobnicate:=1', status=1,
                     environment={'ROS_MASTER_URI': master})
     assert "/%s cannot start" % name in output and 'frobnicate' in output and 'Traceback' not in output
-
-
-@pytest.fixture(scope='module')
-def loaded(installed, tmp_path_factory):
-    """Nodes and parameters of each launch file, with stand-ins for packages that not every machine has."""
-    packages = tmp_path_factory.mktemp('packages')
-    stand_in_launch_file(packages, 'realsense2_camera/launch/rs_camera.launch', RS_CAMERA_ARGUMENTS)
-    for name, arguments in GAZEBO_ARGUMENTS.items():
-        stand_in_launch_file(packages, name, arguments)
-    for name in ('jackal_description', 'xacro'):
-        write(packages / name / 'package.xml', '<package format="2"><name>%s</name></package>' % name)
-    write(packages / 'xacro' / 'xacro', '#!/bin/sh\necho "$JACKAL_URDF_EXTRAS"\n')
-    (packages / 'xacro' / 'xacro').chmod(0o755)
-    load = packages / 'load.py'
-    write(load, LOAD)
-    return yaml.safe_load(run_in(installed, 'env "ROS_PACKAGE_PATH=%s:$ROS_PACKAGE_PATH" python3' % packages, load,
-                                 os.path.join(installed, 'share', 'ros_3d_bb', 'launch'), *ARGUMENTS))
-
-
-def test_launch_files_load_and_start_installed_nodes(installed, loaded):
-    assert sorted(loaded) == sorted(os.listdir(os.path.join(ROOT, 'launch')))
-    started = set(node for nodes, _parameters in loaded.values() for node in nodes if node.startswith('ros_3d_bb/'))
-    assert started == set('ros_3d_bb/' + name for name in NODES)
-
-
-def test_files_named_in_launch_files_are_installed(installed, loaded):
-    named = [value for _nodes, parameters in loaded.values() for value in parameters.values() if installed in value]
-    share = os.path.join(installed, 'share', 'ros_3d_bb')
-    for path in ('config/scenarios/demo.yaml', 'urdf/d435i.urdf.xacro'):
-        assert os.path.join(share, path) in named
-    for path in named:
-        assert os.path.exists(path), path
 
 
 def test_a_scene_becomes_a_bag_boxes_tracks_and_a_report(installed, tmp_path):

@@ -1,13 +1,9 @@
-"""Nodes of jackal.launch and desk.launch, and the camera in the description of the robot."""
+"""Nodes of jackal.launch. test_jackal_packages.py tests the camera in the description of the robot."""
 import os
-import xml.etree.ElementTree as ElementTree
 
-import numpy as np
 import pytest
-import xacro
 
-from support.launching import JACKAL_TO_BE_EXTENDED, ROOT, dumped, given_to_stand_ins, loaded, write
-from support.urdf import base_from
+from support.launching import ROOT, dumped, given_to_stand_ins, loaded
 
 CAMERA = os.path.join(ROOT, 'urdf', 'jackal_d435i.urdf.xacro')
 
@@ -53,30 +49,3 @@ def test_computer_moves_the_pipeline_but_not_the_camera():
     remote = set(name for name, node in nodes.items() if node.machine_name == 'people')
     assert remote == {'people_node', 'planner_bridge_node'}
     assert set(nodes) - remote == {'realsense_node', 'camera_mount'}
-
-
-@pytest.fixture
-def jackal(tmp_path, monkeypatch):
-    """The description of a robot that includes the camera as jackal.urdf.xacro does, given environment variables."""
-    write(tmp_path / 'robot.urdf.xacro', JACKAL_TO_BE_EXTENDED)
-
-    def described(**variables):
-        for name, value in dict(variables, JACKAL_URDF_EXTRAS=CAMERA).items():
-            monkeypatch.setenv(name, value)
-        return ElementTree.fromstring(xacro.process_file(str(tmp_path / 'robot.urdf.xacro')).toxml())
-    return described
-
-
-def test_the_camera_is_at_the_position_in_the_thesis(jackal):
-    description = jackal()
-    np.testing.assert_allclose(base_from('camera_link', description)[:3, 3], (0.17, 0, 0.20), atol=1e-12)
-    assert [link.get('name') for link in description.findall('link')] == ['base_link', 'camera_link']
-
-
-def test_variables_set_position_tilt_and_mesh(jackal):
-    description = jackal(JACKAL_D435I_OFFSET='0.1 -0.05 0.4', JACKAL_D435I_RPY='0 0.5 0', JACKAL_D435I_MESH='1')
-    base_from_camera = base_from('camera_link', description)
-    np.testing.assert_allclose(base_from_camera[:3, 3], (0.1, -0.05, 0.4))
-    np.testing.assert_allclose(base_from_camera[:3, 0], (np.cos(0.5), 0, -np.sin(0.5)), atol=1e-12)  # tilted down
-    mesh = description.find("link[@name='camera_link']/visual/geometry/mesh")
-    assert mesh.get('filename') == 'package://realsense2_description/meshes/d435.dae'

@@ -16,20 +16,31 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.nodes.bbox3d_node import SampleImages
 from ros_3d_bb.nodes.common import master, startup, subscribers
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics, unsubscribed_results
+from support.pages import node_pages
 from support.ros import wait_until
 
 
-@pytest.mark.parametrize('module, place', [
-    ('ros_3d_bb.nodes.bbox3d_node', ' (~stride: launch argument bbox3d_params:=FILE)'), ('ros_3d_bb_lab.node', '')])
-def test_a_node_that_cannot_start_names_the_launch_argument(module, place):
+@pytest.mark.parametrize('name, parts, place', [
+    ('bbox3d_node', (), ' (~stride: launch argument bbox3d_params:=FILE)'), ('simulator_node', (), ''),
+    ('people_node', ('tracker_node', 'bbox3d_node'), ' (~stride: launch argument bbox3d_params:=FILE)')])
+def test_a_node_that_cannot_start_names_the_launch_argument(name, parts, place):
     def node():
-        raise ValueError('parameter ~stride is 0')
-    node.__module__ = module
-    with mock.patch.multiple(rospy, init_node=mock.DEFAULT, logfatal=mock.DEFAULT, get_name=lambda: '/bbox3d_node') \
+        raise ValueError('parameter ~stride is 0; the service ~enable works')
+    stored = {'/bbox3d_node': {'stride': 0}, '/tracker_node': {}, '/simulator_node': {'stride': 0}}
+    with mock.patch.multiple(rospy, init_node=mock.DEFAULT, logfatal=mock.DEFAULT, get_name=lambda: '/' + name,
+                             resolve_name=lambda each: '/' + each, get_param=lambda each, _none: stored[each]) \
             as mocked, mock.patch.object(startup, 'Registration'), pytest.raises(SystemExit):
-        startup.run_node('bbox3d_node', node)
+        startup.run_node(name, node, parts=parts)
     text, *values = mocked['logfatal'].call_args[0]
-    assert text % tuple(values) == '/bbox3d_node cannot start: parameter ~stride is 0' + place
+    expected = '/%s cannot start: parameter ~stride is 0; the service ~enable works%s' % (name, place)
+    assert text % tuple(values) == expected
+
+
+def test_launch_files_have_the_arguments_that_messages_name():
+    for node, argument in startup.PARAMS_FILES.items():
+        launch_files = [launch for launch, _element in node_pages.starting(node)] if argument == 'params' \
+            else node_pages.launch_files()
+        assert any(name == argument for launch in launch_files for name, _default, _doc in launch.arguments), node
 
 
 def test_a_request_to_a_master_that_hangs_ends(monkeypatch):

@@ -20,13 +20,13 @@ KEYS = {'numpy': 'python3-numpy', 'cv2': 'python3-opencv', 'torch': 'python3-tor
         'yaml': 'python3-yaml', 'matplotlib': 'python3-matplotlib', 'scipy': 'python3-scipy',
         'norfair': None, 'trackeval': None, 'pyrealsense2': None,
         'PyQt5': None}  # part of python_qt_binding, and used without it
-TEST_KEYS = {'pytest': 'python3-pytest', 'hypothesis': 'python3-hypothesis',
-             'catkin_pkg': 'python3-catkin-pkg-modules'}
+TEST_KEYS = {'pytest': 'python3-pytest', 'hypothesis': 'python3-hypothesis'}
 # What Melodic's own Python packages need on Python 3.
 FOR_MELODIC = {'python3-gnupg', 'python3-pycryptodome'}
 FOR_DEBIAN = {'tf2_tools'}  # which has programs of tf2_ros there
 OPTIONAL = {'move_base'}  # of navigation.launch, for robots that have it
 NODES = {node.name: node for node in node_pages.nodes()}
+INSTALLED = 'launch', 'config', 'rviz', 'urdf', 'worlds'
 REQUIRED_ARGUMENTS = ['weights:=yolov5n.pt', 'bag:=some.bag', 'session:=/some/session', 'record:=/some/record.json',
                       'camera_height:=1.2']
 
@@ -79,7 +79,7 @@ def test_nodes_that_rarely_draw_images_do_not_load_opencv(node):
 def test_imports_of_the_tests_are_declared_or_in_their_requirements():
     names = imported(glob.glob(inside('test', '**', '*.py'), recursive=True))
     # gazebo_msgs: test/gazebo needs Gazebo; people_msgs: real or a stand-in
-    names -= {'support', 'fuzz', 'soak', 'conftest', 'gazebo_msgs', 'people_msgs'}
+    names -= {'support', 'fuzz', 'test_faults', 'conftest', 'gazebo_msgs', 'people_msgs'}
     with open(inside('test', 'requirements.txt')) as stream:
         required = set(re.findall(r'^([\w-]+)', stream.read(), re.MULTILINE))
     known = declared('depend', 'exec_depend', 'test_depend')
@@ -138,10 +138,14 @@ def test_parameter_files_are_read_as_the_defaults(path, node):
 def test_launch_files_load_and_document_their_arguments(name):
     for argument in ElementTree.parse(inside('launch', name)).getroot().findall('arg'):
         assert argument.get('doc') or argument.get('value'), '%s: %s' % (name, argument.get('name'))
-    _parameters, nodes = loaded(name, *REQUIRED_ARGUMENTS)
+    parameters, nodes = loaded(name, *REQUIRED_ARGUMENTS)
     assert nodes
     for node in nodes.values():
         assert node.package != 'ros_3d_bb' or os.path.exists(inside('scripts', node.type))
+    for value in parameters.values():  # files, which are installed
+        inner = os.path.relpath(os.path.realpath(str(value)), ROOT)
+        if str(value).startswith(os.sep) and not inner.startswith(os.pardir):
+            assert os.path.exists(inside(inner)) and inner.split(os.sep)[0] in INSTALLED, value
 
 
 @pytest.mark.parametrize('name', ['yolov5.launch', 'bbox3d.launch', 'tracker.launch', 'depth_detector.launch',

@@ -144,6 +144,18 @@ def test_without_transforms_the_summary_names_the_cause(scene, tmp_path):
     assert '/ros_3d_bb/tracks' not in found and len(found['/ros_3d_bb/bb_3d']) == 15
 
 
+def test_a_stopped_stamp_is_the_cause_that_the_summary_names(scene, tmp_path):
+    def stopped(topic, message, time):
+        if 'depth' in topic:
+            message.header.stamp = time_from(START_NS)
+        return topic, message, time
+    rewritten(scene, tmp_path / 'in.bag', stopped)
+    result = run_tool(tmp_path / 'in.bag', tmp_path / 'out.bag', '--detector', 'depth')
+    last = result.stdout.splitlines()[-1]
+    assert last.startswith('no tracks: colour images rejected: no depth image with their stamp')
+    assert last.endswith('(~stamp_tolerance: --depth-params FILE and --bbox3d-params FILE and --tracker-params FILE)')
+
+
 def recordings_of_another_robot(folder):
     """(bag, topics, detector, depth of the torso's surface): three single images of a man, in which depth is 0.11 to
     0.22 s older than colour; without recorded data one image of the simulator.

@@ -6,11 +6,14 @@ import re
 import xml.etree.ElementTree as ElementTree
 
 import pytest
+import yaml
 
 from support.code_blocks import PAGES, ROOT
 
 NAMED = PAGES + ('doc/error_model.md',)  # its blocks are the record of a campaign
 FORMAT = re.compile(r'%[-+\d.]*[a-zA-Z]')
+with open(os.path.join(ROOT, 'doc', 'figures.yaml'), encoding='utf-8') as _stream:
+    FIGURES = yaml.safe_load(_stream)
 
 
 def text_of(path):
@@ -48,15 +51,18 @@ def test_messages_in_the_table_of_symptoms_are_in_the_code():
     assert [message for message in quoted if not any(message in text for text in texts)] == []
 
 
-def test_figures_of_the_readme_are_in_the_section_they_link_to():
-    benchmarks, rows = text_of('doc/benchmarks.md'), text_of('README.md').split('## Accuracy and speed\n')[1]
-    rows = re.findall(r'^- \[.*?\]\(doc/benchmarks.md#([\w-]+)\)(.*)$', rows.split('\n## ')[0], re.MULTILINE)
-    assert len(rows) >= 5
-    for anchor, text in rows:
-        section, = [part for part in re.split(r'^## ', benchmarks, flags=re.MULTILINE)
-                    if part.splitlines()[0].lower().replace(' ', '-') == anchor]
-        for figure in re.findall(r'\*\*([\d.]+)', text):
-            assert re.search(r'(?<![\d.])%s(?![\d])' % re.escape(figure), section), (anchor, figure)
+@pytest.mark.parametrize('name', sorted(FIGURES))
+def test_pages_quote_the_measured_figure(name):
+    for page, quote in FIGURES[name]['quotes'].items():
+        assert quote.format(FIGURES[name]['value']) in ' '.join(text_of(page).split()), page
+
+
+def test_each_bold_figure_of_the_readme_is_a_measured_one():
+    section = text_of('README.md').split('## Accuracy and speed\n')[1].split('\n## ')[0]
+    quotes = [figure['quotes']['README.md'].format(figure['value']) for figure in FIGURES.values()
+              if 'README.md' in figure['quotes']]
+    bold = re.findall(r'\*\*[\d.]+', section)
+    assert len(bold) >= 10 and [each for each in bold if not any(each in quote for quote in quotes)] == []
 
 
 @pytest.mark.parametrize('page', NAMED)

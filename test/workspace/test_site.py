@@ -1,4 +1,5 @@
 """The documentation as a site: Sphinx builds it without a warning."""
+import glob
 import os
 import re
 import subprocess
@@ -21,3 +22,11 @@ def test_the_site_has_every_page_and_formulas_without_scripts(tmp_path):
         assert (pages / (path + '.html')).exists()
     formulas = re.findall(r'<math.*?</math>', (pages / 'tracking.html').read_text(encoding='utf-8'), re.DOTALL)
     assert len(formulas) > 20 and not any('\\' in formula for formula in formulas)  # no TeX command remains
+
+
+@pytest.mark.parametrize('path', sorted(glob.glob(os.path.join(ROOT, '*.md')) + glob.glob(os.path.join(DOC, '*.md'))),
+                         ids=os.path.basename)
+def test_no_line_is_left_out_as_a_comment(path):
+    """MyST takes lines that begin with a percent sign for comments."""
+    with open(path, encoding='utf-8') as stream:
+        assert not re.search('^ *%', stream.read(), re.MULTILINE)

@@ -1,5 +1,6 @@
 """Run the pipeline on a bag without a ROS master. Equal input bags and parameters give identical output bags."""
 import collections
+import contextlib
 import itertools
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, NamedTuple, Optional
@@ -10,11 +11,13 @@ from ros_3d_bb.bags.bag_reader import BagError, BagReader, Raw, message_in
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.bags.bag_writer import new_bag
 from ros_3d_bb.camera.image_rotation import mounted_camera, turns_for
-from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, IMAGE_KINDS, STATIC_TOPIC, TF_TOPIC
+from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, IMAGE_KINDS, STATIC_TOPIC, TF_TOPIC,
+                                               info_of_images, uncompressed)
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC
 from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.yolov5.backends import open_detector
+from ros_3d_bb.pipeline.camera_pose import FLOOR, POSE_FITTED, POSE_TEXT, CameraPoseStage
 from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.detection_stage import CameraRotation, detect_in_color
 from ros_3d_bb.pipeline.people_pipeline import (DEPTH_INFO_TOPIC, INFO_TOPIC, INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA,
@@ -66,7 +69,7 @@ class BagRun(object):
         for raw in self._reader.messages([static]):
             self._add_static(raw)
         if self._settings.camera_pose is not None:
-            self._set_camera_pose(*self._settings.camera_pose)
+            self._set_camera_pose()
         self._read_depth_cameras()
         with ThreadPoolExecutor(self._settings.searches) as pool:
             for waiting in self._ahead(pool):
@@ -86,25 +89,47 @@ class BagRun(object):
         while self._unread_tf and self._unread_tf[0][0] <= until_ns:
             self._transforms.add(self._unread_tf.popleft()[1])
 
-    def _set_camera_pose(self, height_m, tilt_rad, roll_rad):
-        """Set the pose of the camera, whose frame is that of its first message unless a parameter replaces it.
+    def _set_camera_pose(self):
+        """Set the pose of the camera, which tf does not contain.
 
         The other frames of the bag are those of the driver, which do not move, even if it publishes them on tf.
         """
         tf_topic, ends_ns = self._settings.name(TF_TOPIC), self._reader.span_ns[0] + DRIVER_TF_NS
         for raw in itertools.takewhile(lambda raw: raw.time.to_nsec() < ends_ns, self._reader.messages([tf_topic])):
             self._add_static(raw)
-        params = self._settings.bbox3d[0]
+        frame_id, pose = self._fitted_pose() if self._settings.camera_pose == FLOOR else self._given_pose()
+        for transforms in (self._transforms, self._detector_transforms) if frame_id else ():
+            transforms.set_pose(self._settings.tracker[0].target_frame, frame_id, pose)
+
+    def _given_pose(self):
+        """Return the frame of the 3D boxes, empty if no message has it, and its pose (4, 4) from the settings."""
+        params, (height_m, tilt_rad, roll_rad) = self._settings.bbox3d[0], self._settings.camera_pose
         pose = mounted_camera(height_m, tilt_rad, turns_for(params.image_rotation, None), roll_rad)
         topic = INFO_TOPIC if params.depth == RAW else DEPTH_TOPIC  # whose frame is that of the 3D boxes
         for raw in self._reader.messages([self._settings.name(topic)]):
-            try:
-                frame_id = params.frame_id or message_in(raw, *INPUTS[topic]).header.frame_id
-            except ValueError:  # reported when the message is processed
-                continue
-            for transforms in (self._transforms, self._detector_transforms):
-                transforms.set_pose(self._settings.tracker[0].target_frame, frame_id, pose)
-            return
+            with contextlib.suppress(ValueError):  # reported when the message is processed
+                return params.frame_id or message_in(raw, *INPUTS[topic]).header.frame_id, pose
+        return '', pose
+
+    def _fitted_pose(self):
+        """Return the frame of the depth images, and its pose (4, 4) from the floor in them. Raises ValueError."""
+        params = self._settings.bbox3d[0]
+        stage, depth = CameraPoseStage(params), self._settings.name(DEPTH_TOPIC)
+        info_topic = DEPTH_INFO_TOPIC if params.depth == RAW else INFO_TOPIC
+        info = self._settings.name(info_topic)
+        for raw in self._reader.messages([info, depth]):
+            with contextlib.suppress(ValueError):  # reported when the message is processed
+                if raw.topic == info:
+                    stage.add_camera_info(info_of_images(message_in(raw, *INPUTS[info_topic]), depth))
+                else:
+                    stage.add_depth(uncompressed(message_in(raw, *INPUTS[DEPTH_TOPIC])))
+            if stage.is_complete:
+                break
+        if stage.pose is None:
+            raise ValueError('no image on %s shows the floor, to which --camera-pose fits the pose of the camera; give '
+                             'it with --camera-height, --camera-tilt and --camera-roll' % depth)
+        self._events.note(POSE_FITTED, POSE_TEXT % stage.pose)
+        return stage.frame_id, stage.floor_from_camera
 
     def _read_depth_cameras(self):
         """Pass the first camera_info of raw depth to the pipeline, which needs it for the first image."""

@@ -3,7 +3,7 @@ import genpy
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.conversions.camera_msgs import transform_messages
-from ros_3d_bb.conversions.perception_msgs import NEWEST, check_transforms
+from ros_3d_bb.conversions.perception_msgs import check_transforms
 from ros_3d_bb.pipeline.transform_buffer import TransformBuffer
 
 
@@ -31,9 +31,5 @@ class BagTransforms(TransformBuffer):
 
         Raises ValueError if the transforms already contain the frame in `target_frame`.
         """
-        root = self.root_of(frame)
-        if root == target_frame.lstrip('/'):
-            raise ValueError('the bag contains the pose of %s in %s; a bag without it expected (--camera-height)'
-                             % (frame, target_frame))
-        target_from_root = target_from_frame.dot(self.lookup(frame, root, NEWEST))
-        self.add_static(TFMessage(transform_messages(genpy.Time(0), [(target_frame, root, target_from_root)])))
+        self.add_static(TFMessage(transform_messages(genpy.Time(0), [
+            self.link_to_root(target_frame, frame, target_from_frame)])))

@@ -13,6 +13,7 @@ from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.core.params import IMAGE_ROTATION, params_from, with_places
 from ros_3d_bb.core.yaml_loader import load_yaml
+from ros_3d_bb.pipeline.camera_pose import FLOOR, POSE_FITTED
 from ros_3d_bb.pipeline.people_pipeline import DETECTORS, TRACKED, Settings
 
 HIGHEST_M = 100.0
@@ -100,20 +101,28 @@ def _with_camera(settings, given):
         for option, value in (('--camera-tilt', given.camera_tilt), ('--camera-roll', given.camera_roll)):
             if value:
                 raise ValueError('%s is given without --camera-height; both expected, or neither' % option)
+    if given.camera_height is None and given.camera_pose is None:
         return settings
-    tracker = settings.tracker[0]
+    if given.camera_height is not None and given.camera_pose is not None:
+        raise ValueError('--camera-height and --camera-pose are given; one of them expected')
+    tracker, option = settings.tracker[0], '--camera-pose' if given.camera_height is None else '--camera-height'
     if tracker.cameras:
-        raise ValueError('--camera-height is given with several cameras; expected with a single camera only')
+        raise ValueError('%s is given with several cameras; expected with a single camera only' % option)
+    for node in IMAGE_NODES:
+        settings = with_params(settings, node, floor_frame=tracker.target_frame)
+    settings = with_params(settings, 'depth', floor_height=0.0)
+    return settings._replace(camera_pose=given.camera_pose or _given_pose(given))
+
+
+def _given_pose(given):
+    """Return height, tilt and roll of the camera on the command line. Raises ValueError."""
     if not (0 < given.camera_height < HIGHEST_M and abs(given.camera_tilt) < math.pi / 2):
         raise ValueError('--camera-height is %g and --camera-tilt %g; more than 0 and less than %g m, and less than '
                          'pi / 2 rad expected' % (given.camera_height, given.camera_tilt, HIGHEST_M))
     if not abs(given.camera_roll) < math.pi / 4:
         raise ValueError('--camera-roll is %g; less than pi / 4 rad expected, and --image-rotation for quarter turns'
                          % given.camera_roll)
-    for node in IMAGE_NODES:
-        settings = with_params(settings, node, floor_frame=tracker.target_frame)
-    settings = with_params(settings, 'depth', floor_height=0.0)
-    return settings._replace(camera_pose=(given.camera_height, given.camera_tilt, given.camera_roll))
+    return given.camera_height, given.camera_tilt, given.camera_roll
 
 
 def with_params(settings, node, **changed):
@@ -145,7 +154,7 @@ def _process(job):
     except Exception as error:  # a damaged bag can raise any exception
         print('%s; no bag was written' % _reason(job, error), file=sys.stderr, flush=True)
         return False
-    print('\n'.join(['%s:' % job.target] + _summary(events)), flush=True)
+    print('\n'.join(['%s:' % job.target] + _summary(events, job.settings.detector)), flush=True)
     return True
 
 
@@ -154,32 +163,37 @@ def _reason(job, error):
     if isinstance(error, BagError):
         return str(error)
     if isinstance(error, (ValueError, OSError)):
-        return '%s: %s' % (job.source, with_places(str(error), option_of))
+        return '%s: %s' % (job.source, with_places(str(error), lambda name: option_of(name, job.settings.detector)))
     return '%s: %s: %s' % (job.source, type(error).__name__, cause(error))
 
 
-def option_of(name):
-    """Return the option that sets a parameter of a node; empty if no node has it."""
+def option_of(name, detector):
+    """Return the option that sets a parameter of the nodes with a detector; empty if no node has it."""
     if name in OPTIONS:
         return '--' + name.replace('_', '-')
-    files = [option for option, node in FILES if any(name in part._fields for part in getattr(Settings(), node))]
-    return ' or '.join(files) + ' FILE' if files else ''
+    unused = {'yolov5', 'depth'} - {detector}
+    files = [option + ' FILE' for option, node in FILES
+             if node not in unused and any(name in part._fields for part in getattr(Settings(), node))]
+    return ' and '.join(files)
 
 
-def _summary(events):
-    lines = ['  %7d  %s%s' % (count, event, '. The first: %s' % with_places(events.sentences[event], option_of)
+def _summary(events, detector):
+    def placed(event):
+        return with_places(events.sentences[event], lambda name: option_of(name, detector))
+
+    lines = ['  %7d  %s%s' % (count, event, '. The first: %s' % placed(event)
                               if event in events.sentences else '') for event, count in events.counts.items()]
-    return lines + ([] if events.counts.get(TRACKED) else ['no tracks: ' + _why_no_tracks(events)])
+    return lines + ([] if events.counts.get(TRACKED) else ['no tracks: ' + _why_no_tracks(events, placed)])
 
 
-def _why_no_tracks(events):
+def _why_no_tracks(events, placed):
     """Return the likely cause if no track was written, as a sentence."""
     counts = events.counts
+    event = max(set(events.sentences) - {POSE_FITTED}, key=lambda each: (counts[each], each), default=None)
+    if event is not None and counts[event] > counts.get('images tracked', 0):
+        return placed(event)
     if counts.get('images tracked') and counts.get('boxes estimated'):
         return 'none of %d 3D boxes was confirmed by later images' % counts['boxes estimated']
-    if not counts.get('images tracked') and events.sentences:
-        event = max(events.sentences, key=lambda each: (counts[each], each))
-        return with_places(events.sentences[event], option_of)
     if counts.get('boxes without depth'):
         return 'none of %d 2D boxes has depth' % counts['boxes without depth']
     return ('no people were detected; rosrun ros_3d_bb doctor BAG checks the images and the orientation of the camera '
@@ -218,6 +232,8 @@ def _parser():
                         'the camera, radians; positive: it looks down (default: 0)')
     parser.add_argument('--camera-roll', type=float, default=0.0, metavar='RAD', help='with --camera-height, roll of '
                         'the camera, radians; positive: its right side is lower (default: 0)')
+    parser.add_argument('--camera-pose', choices=(FLOOR,), help='for a bag without tf: fit height, tilt and roll of '
+                        'the camera to the floor in the depth images')
     parser.add_argument('--image-rotation', choices=IMAGE_ROTATION.choices, help='clockwise rotation that makes the '
                         'images upright, degrees (default: auto, from tf)')
     parser.add_argument('--cameras', metavar='NAMES', help='namespaces of several cameras, separated by commas (front, '

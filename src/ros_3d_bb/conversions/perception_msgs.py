@@ -12,7 +12,7 @@ from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 from ros_3d_bb import msg
 from ros_3d_bb.camera.camera_model import Camera, transform_from
 from ros_3d_bb.core.labels import PERSON, label_fault, score_fault, usable_label
-from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M
+from ros_3d_bb.core.valid_ranges import MAX_COORDINATE_M, MAX_SIZE_M
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
@@ -265,7 +265,7 @@ def _box3d_fault(box, position_covariance):
     """Describe what is wrong with a Box3D from a message, '' if it can be tracked."""
     if not box.is_plausible:
         return ('centre (%g, %g, %g) and size (%g, %g); finite numbers and sizes of more than 0 and less than %g m '
-                'expected' % (tuple(box.center_m) + tuple(box.size_m[:2]) + (LARGEST_M,)))
+                'expected' % (tuple(box.center_m) + tuple(box.size_m[:2]) + (MAX_SIZE_M,)))
     if not _is_covariance(position_covariance):
         return ('the position_covariance %s; a finite, positive semi-definite matrix, or zeros where it is not known, '
                 'expected' % list(position_covariance))
@@ -278,7 +278,7 @@ def _is_covariance(elements_m2):
     It is if the Gaussian elimination of its symmetric part, plus the tolerance, has positive pivots. For single small
     matrices, arithmetic is several times as fast as numpy's eigenvalues.
     """
-    if not (math.isfinite(sum(elements_m2)) and max(map(abs, elements_m2)) < FARTHEST_M):
+    if not (math.isfinite(sum(elements_m2)) and max(map(abs, elements_m2)) < MAX_COORDINATE_M):
         return False
     xx, xy, xz, yx, yy, yz, zx, zy, zz = elements_m2
     tolerance_m2 = ROUNDING * max(1, max(elements_m2)) / 2

@@ -6,7 +6,7 @@ import numpy as np
 import yaml
 
 from ros_3d_bb.core.labels import PEOPLE, PERSON, label_fault
-from ros_3d_bb.core.limits import LARGEST_M
+from ros_3d_bb.core.valid_ranges import MAX_SIZE_M
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.core.yaml_loader import load_yaml
 
@@ -34,8 +34,8 @@ class ObjectClass(NamedTuple):
 
     @property
     def largest_m(self):
-        """Upper bound of the width and the height of an object, metres."""
-        return TALLEST_PERSON * self.height if self.group == PERSON else LARGEST_M
+        """Upper bound of width and height, metres; that of people follows from their usual height."""
+        return TALLEST_PERSON * self.height if self.group == PERSON and self.height else MAX_SIZE_M
 
     def axis_behind(self, seen_m):
         """Distance from the visible surface to the vertical axis of an object that appears `seen_m` wide.
@@ -71,7 +71,7 @@ CLASSES = OrderedDict([
     ('handbag', ObjectClass(_LUGGAGE, 0.3, 0.3, axis=0.1)),
     ('trolley', ObjectClass('trolley', 0.45, 1.0, 0.6)),
     ('potted plant', ObjectClass('potted plant', 0.4, 0.8, axis=0.15, **_FURNITURE))])
-RANGES = {'width': LARGEST_M, 'height': LARGEST_M, 'length': LARGEST_M, 'axis': LARGEST_M,
+RANGES = {'width': MAX_SIZE_M, 'height': MAX_SIZE_M, 'length': MAX_SIZE_M, 'axis': MAX_SIZE_M,
           'acceleration': LARGEST_FACTOR, 'initial_speed': LARGEST_FACTOR}
 
 

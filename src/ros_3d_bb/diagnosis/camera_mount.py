@@ -5,7 +5,7 @@ import numpy as np
 
 from ros_3d_bb.camera.image_rotation import turned_camera, turned_depth, turned_image
 from ros_3d_bb.detection.depth.detector import DepthPeople
-from ros_3d_bb.detection.depth.ground_plane import fit_floor
+from ros_3d_bb.detection.depth.ground_plane import CameraPose, camera_pose_above, fit_floor
 
 IMAGES = 8  # that are used, of those given
 FEW = 0.5  # people per image, below which the other rotations are tried
@@ -13,17 +13,15 @@ MIN_PEOPLE, TIMES_MORE = 4, 3  # that are found in rotated images, at least, and
 
 
 class CameraMount(NamedTuple):
-    """Mount of a camera; the angles are those of `image_rotation.mounted_camera`.
+    """Mount of a camera.
 
-    `height_m` is None if no floor is visible, `people` is their number in the images for each number of quarter turns.
+    `pose` is None if no floor is visible, `people` is their number in the images for each number of quarter turns.
     """
 
     images: int
     people: dict
     turns: int
-    height_m: Optional[float] = None
-    tilt_rad: float = 0.0
-    roll_rad: float = 0.0
+    pose: Optional[CameraPose] = None
 
 
 def camera_mount(pairs, camera):
@@ -43,12 +41,7 @@ def camera_mount(pairs, camera):
     turns = best if people[best] >= max(MIN_PEOPLE, TIMES_MORE * people[0]) else 0
     floors = [fit_floor(turned_depth(depth, turns), turned_camera(camera, turns)) for _color, depth in chosen]
     floors = [floor for floor in floors if floor is not None]
-    if not floors:
-        return CameraMount(len(chosen), people, turns)
-    x, y, z = np.median([floor.normal for floor in floors], axis=0).tolist()
-    height_m = float(np.median([floor.offset_m for floor in floors]))
-    return CameraMount(len(chosen), people, turns, height_m, float(np.arctan2(-z, np.hypot(x, y))),
-                       float(np.arctan2(-x, -y)))
+    return CameraMount(len(chosen), people, turns, camera_pose_above(floors) if floors else None)
 
 
 def _people_in(pairs, camera, turns):

@@ -14,6 +14,7 @@ from ros_3d_bb.pipeline.transform_buffer import path_to_root
 
 COLOR, DEPTH, INFO, BOXES2D, BOXES3D, TRACKS = 'color', 'depth', 'info', 'boxes2d', 'boxes3d', 'tracks'
 IMAGES = COLOR, DEPTH, INFO
+MAX_REPEATED = 0.2  # share of the messages on a topic with the stamp of the one before; chosen
 UNSTAMPED_FIX = 'their publisher must set it to the time at which the image was taken'
 CAMERA = 'the camera (roslaunch ros_3d_bb realsense.launch)'
 CAMERA_SILENT = 'is the camera plugged in, the bag still playing (not paused), the network fast enough for images?'
@@ -134,9 +135,16 @@ def _stamps(seen):
         stream = seen.streams[key]
         if not stream.count:
             continue
+        if not stream.stamps_ns and key == INFO:
+            continue  # it is used without
         if not stream.stamps_ns:
             yield Finding('stamps', '', 'the messages on %s have no stamp (zero)' % stream.topic,
                           UNSTAMPED_FIX)
+            return
+        repeated = sum(one == other for one, other in zip(stream.stamps_ns, stream.stamps_ns[1:]))
+        if repeated > MAX_REPEATED * len(stream.stamps_ns):
+            yield Finding('stamps', '', '%d of %d messages on %s have the stamp of the one before'
+                          % (repeated, len(stream.stamps_ns), stream.topic), UNSTAMPED_FIX)
             return
         missing = min(stream.count, KEPT) - len(stream.stamps_ns)
         if missing:
@@ -201,9 +209,9 @@ def _mount(seen):
         yield Finding('image rotation', '', '%d people are found in %d images, and %d if they are turned clockwise by '
                       '%d degrees' % (mount.people[0], mount.images, mount.people[mount.turns], 90 * mount.turns),
                       'pass image_rotation:=%d (process_bag: --image-rotation %d)' % (2 * (90 * mount.turns,)))
-    if mount.height_m is not None:
+    if mount.pose is not None:
         yield Finding('floor', 'the camera is %.2f m above it, tilted by %.2f rad and rolled by %.2f rad; fitted to '
-                      'the depth images' % (mount.height_m, mount.tilt_rad, mount.roll_rad))
+                      'the depth images' % mount.pose)
 
 
 def _pairs_of_boxes(seen):

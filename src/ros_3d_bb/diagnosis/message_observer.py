@@ -21,20 +21,23 @@ from ros_3d_bb.diagnosis.observations import COMPRESSED_IMAGE, IMAGE, KEPT, Newe
 from ros_3d_bb.diagnosis.tf_tree import links_in
 from ros_3d_bb.pipeline.depth_registration import RAW
 
-COMPARED_NS, PAIRS = NS // 4, 16  # between two comparisons of edges; newest images that are kept
+COMPARED_NS, PAIRS = NS // 4, 16  # between two images that are kept and compared; number of those that are kept
 BAG_SECONDS = 10.0  # cache length of tf2
 
 
 class EdgeObserver(object):
-    """Compare the edges of colour and depth images with the same stamp, at most every `COMPARED_NS`.
-
-    Up to `PAIRS` images of them, RGB and DepthImage, are kept in `pairs`.
-    """
+    """Compare the edges of colour and depth images with the same stamp, at most every `COMPARED_NS`."""
 
     def __init__(self, color, depth):
-        self._edges, self._color, self._depth, self._compared_ns = EdgeComparison(), color, depth, 0
-        self.pairs = collections.deque(maxlen=PAIRS)
+        self._edges, self._color, self._depth = EdgeComparison(), color, depth
+        self._same, self._near = (collections.deque(maxlen=PAIRS) for _kind in range(2))  # (stamp, RGB, DepthImage)
         color.on_message = depth.on_message = self._compare
+
+    @property
+    def pairs(self):
+        """Up to `PAIRS` colour images, RGB, with the DepthImage of their stamp or, if the camera does not synchronize
+        its images, of a stamp at most `COMPARED_NS` away."""
+        return [pair[1:] for pair in self._same or self._near]
 
     def fault(self):
         """Return a sentence if the edges disagree, '' otherwise."""
@@ -44,13 +47,15 @@ class EdgeObserver(object):
         color, depth = self._color.newest, self._depth.newest
         if color is None or depth is None:
             return
-        stamp_ns = color.header.stamp.to_nsec()
-        if (abs(stamp_ns - depth.header.stamp.to_nsec()) <= SAME_NS
-                and abs(stamp_ns - self._compared_ns) >= COMPARED_NS):
-            self._compared_ns = stamp_ns
+        stamp_ns, depth_stamp_ns = color.header.stamp.to_nsec(), depth.header.stamp.to_nsec()
+        is_same = abs(stamp_ns - depth_stamp_ns) <= SAME_NS
+        pairs = self._same if is_same else self._near
+        is_near = not self._same and abs(stamp_ns - depth_stamp_ns) <= COMPARED_NS
+        if (is_same or is_near) and not (pairs and abs(stamp_ns - pairs[-1][0]) < COMPARED_NS):
             with contextlib.suppress(ValueError):  # reported as an invalid encoding
-                self.pairs.append((imgmsg_to_rgb(color), imgmsg_to_depth(depth)))
-                self._edges.add(*self.pairs[-1])
+                pairs.append((stamp_ns, imgmsg_to_rgb(color), imgmsg_to_depth(depth)))
+                if is_same:
+                    self._edges.add(*pairs[-1][1:])
 
 
 class Observation(object):

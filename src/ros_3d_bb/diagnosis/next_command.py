@@ -59,13 +59,16 @@ def _raw_topic(seen, is_misaligned):
 
 def _pose(mount):
     """Return the options for the pose of a camera without tf, from its CameraMount or None, and a hint."""
-    turned = ' --image-rotation %d' % (90 * mount.turns) if mount is not None and mount.turns else ''
-    if mount is None or mount.height_m is None:
+    if mount is None:  # of raw depth
+        return ' --camera-pose floor', '; height, tilt and roll of the camera are fitted to the floor in its images'
+    turned = ' --image-rotation %d' % (90 * mount.turns) if mount.turns else ''
+    if mount.pose is None:
         return (' --camera-height HEIGHT --camera-tilt TILT' + turned,
                 '; fill in the height of the camera above the floor, metres, and its tilt, radians, positive if it '
                 'looks down')
-    roll = ' --camera-roll %.2f' % mount.roll_rad if abs(mount.roll_rad) > MIN_ROLL_RAD else ''
-    return (' --camera-height %.2f --camera-tilt %.2f%s%s' % (mount.height_m, mount.tilt_rad, roll, turned),
+    height_m, tilt_rad, roll_rad = mount.pose
+    roll = ' --camera-roll %.2f' % roll_rad if abs(roll_rad) > MIN_ROLL_RAD else ''
+    return (' --camera-height %.2f --camera-tilt %.2f%s%s' % (height_m, tilt_rad, roll, turned),
             '; height and tilt are those of the floor in the depth images: correct them if they are known')
 
 

@@ -55,7 +55,8 @@ def why_missing(links, target, source, stamp_s):
         fix = 'start the localisation of the robot in %s, or track in another frame: frame_world:=%s' % (target, up[-1])
         if up[-1] not in ROBOT_FRAMES:
             fix += ('; for a camera that is not on a robot: camera_height:=1.2 camera_tilt:=0.1 camera_root:=%s '
-                    '(process_bag: --camera-height 1.2 --camera-tilt 0.1)' % up[-1])
+                    '(process_bag: --camera-height 1.2 --camera-tilt 0.1), or camera_pose:=floor (--camera-pose floor)'
+                    % up[-1])
         return 'tf has no frame %s; the tree of the camera is %s' % (target, ' < '.join(up)), fix
     if up[-1] != down[-1]:
         return ('tf has two trees, %s and %s, without a transform between them' % (' < '.join(up), ' < '.join(down)),
@@ -74,8 +75,8 @@ def pose_fix(frame):
     """How to publish the pose of a camera that is not on a robot; `frame` is its optical frame."""
     return ('publish its pose, here 1.2 m above the floor and tilted down by 0.1 rad: rosrun tf2_ros '
             'static_transform_publisher 0 0 1.2 -1.5708 0 -1.6708 map %s; the launch arguments camera_height:=1.2 '
-            'camera_tilt:=0.1 frame_id:=%s do the same; process_bag: --camera-height 1.2 --camera-tilt 0.1'
-            % (frame, frame))
+            'camera_tilt:=0.1 frame_id:=%s do the same; process_bag: --camera-height 1.2 --camera-tilt 0.1; or let '
+            'camera_pose:=floor (--camera-pose floor) fit it to the floor' % (frame, frame))
 
 
 def _publisher_command(parent, frame):

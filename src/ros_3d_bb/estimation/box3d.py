@@ -10,7 +10,7 @@ import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.core.labels import PERSON
-from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M
+from ros_3d_bb.core.valid_ranges import MAX_COORDINATE_M, MAX_SIZE_M
 
 # A box whose edge is this close to the image border, in pixels plus a share of its extent, counts as truncated. Chosen:
 # detectors regress the edge of a truncated person up to 8 pixels inside the image, farther for larger boxes. A person
@@ -49,7 +49,7 @@ class Box3D(NamedTuple):
     covariance_m2: Optional[Any] = None
     label: str = PERSON
     score: float = 0.0
-    largest_m: float = LARGEST_M
+    largest_m: float = MAX_SIZE_M
 
     @property
     def truncated(self):
@@ -58,11 +58,11 @@ class Box3D(NamedTuple):
 
     @property
     def is_plausible(self):
-        """Whether the centre is nearer than `FARTHEST_M`, and width and height are between 0 and `largest_m`."""
+        """Whether the centre is nearer than `MAX_COORDINATE_M`, and width and height are between 0 and `largest_m`."""
         x_m, y_m, z_m = self.center_m.tolist()
         width_m, height_m, _width_m = self.size_m.tolist()
         return (0 < width_m < self.largest_m and 0 < height_m < self.largest_m
-                and abs(x_m) < FARTHEST_M and abs(y_m) < FARTHEST_M and abs(z_m) < FARTHEST_M)
+                and abs(x_m) < MAX_COORDINATE_M and abs(y_m) < MAX_COORDINATE_M and abs(z_m) < MAX_COORDINATE_M)
 
 
 def plausible(box):

@@ -18,6 +18,7 @@ GRID_ROWS, GRID_COLUMNS = 48, 32
 # The lower part of a rectangle, where something may stand before the legs, has less weight. Chosen so that no person
 # behind the dog of config/scenarios/objects.yaml is taken for the dog.
 UPPER_SHARE, LOWER_WEIGHT = 0.55, 0.35
+NEAREST_LAYER_M = 0.001  # nearer distances are 0 in whole millimetres
 UNKNOWN_MM, FARTHEST_LAYER_M = 65535, 65.0  # chosen: 16 bits hold the farthest layer and half a body behind it
 # Half the depth extents of a person with stretched arms, and of the trunk. Chosen: points farther from the trunk are
 # not part of the person, and a wall close behind must not shift the median.
@@ -81,7 +82,7 @@ class RectSamples(object):
         self._depth_m = _depths(depth.part(self._rows, self._columns), depth.scale_m)
         self.shape = self._depth_m.shape
         ahead_m = self._along(2)
-        known = (ahead_m > 0) & (ahead_m <= FARTHEST_LAYER_M)
+        known = (ahead_m >= NEAREST_LAYER_M) & (ahead_m <= FARTHEST_LAYER_M)
         self.measured = int(np.count_nonzero(known))
         self._ahead_mm = (1000 * ahead_m + np.float32(0.5)).astype(np.uint16)
         self._ahead_mm[~known] = UNKNOWN_MM

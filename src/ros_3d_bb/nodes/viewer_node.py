@@ -23,7 +23,7 @@ from ros_3d_bb.nodes.common.label import Label
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscribe_camera_info
 from ros_3d_bb.sessions.burst import Burst
-from ros_3d_bb.sessions.frame_synchronizer import ColorImage, Snapshots
+from ros_3d_bb.sessions.snapshots import ColorImage, Snapshots
 from ros_3d_bb.sessions.session_writer import append, remove
 from ros_3d_bb.visualization.cv_window import Window
 from ros_3d_bb.visualization.image_overlay import DEPTH_RANGE_M

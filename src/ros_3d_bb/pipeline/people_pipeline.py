@@ -1,7 +1,7 @@
 """Detection, estimation and tracking of the messages of a bag, as the nodes do it."""
 import contextlib
 import functools
-from typing import NamedTuple, Optional, Tuple
+from typing import NamedTuple, Optional, Tuple, Union
 
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Int32MultiArray
@@ -36,7 +36,8 @@ class Settings(NamedTuple):
     """Detector, parameters of each node, and topics; for bags also concurrent searches and compression.
 
     `names` maps topics of the nodes to those used; `keep` lists the topics to copy (None: all). `camera_pose` is the
-    height, metres, tilt and roll, radians, of a camera without tf (see `image_rotation.mounted_camera`).
+    height, metres, tilt and roll, radians, of a camera without tf (see `image_rotation.mounted_camera`), or
+    `camera_pose.FLOOR`, if they are fitted to the floor.
     """
 
     detector: str = 'yolov5'
@@ -48,7 +49,7 @@ class Settings(NamedTuple):
     keep: Optional[Tuple[str, ...]] = None
     searches: int = 1
     compression: str = 'lz4'
-    camera_pose: Optional[Tuple[float, float, float]] = None
+    camera_pose: Union[str, Tuple[float, float, float], None] = None
 
     @property
     def inputs(self):

@@ -3,7 +3,7 @@ import collections
 
 import tf2_ros
 
-from ros_3d_bb.conversions.perception_msgs import transform_from_msg
+from ros_3d_bb.conversions.perception_msgs import NEWEST, transform_from_msg
 
 CACHE_S = 10.0  # tf2 rejects transforms that are older than the newest one of their frame by more
 MOST_RECENT = 1000  # recent transforms that are kept; chosen: some seconds of /tf of a Jackal, some megabytes
@@ -66,9 +66,18 @@ class TransformBuffer(tf2_ros.BufferCore):
         self._clear_after(stamp.to_sec() + CACHE_S)
         return transform_from_msg(self.lookup_transform_core(target, source, stamp))
 
-    def root_of(self, frame):
-        """The root of the tree of a frame."""
-        return path_to_root(self._parents, frame.lstrip('/'))[-1]
+    def link_to_root(self, target_frame, frame, target_from_frame):
+        """The transform (parent, child, parent_from_child (4, 4)) to the root of the tree of a frame that gives it a
+        pose (4, 4) in a frame that tf does not contain.
+
+        Raises ValueError if the transforms already contain the frame in `target_frame`.
+        """
+        target, frame = target_frame.lstrip('/'), frame.lstrip('/')
+        root = path_to_root(self._parents, frame)[-1]
+        if root == target:
+            raise ValueError('tf contains the pose of %s in %s already; one without it expected (--camera-height, '
+                             '--camera-pose; camera_height:=, camera_pose:=)' % (frame, target))
+        return target, root, target_from_frame.dot(self.lookup(frame, root, NEWEST))
 
     def _is_blocked(self, target, source, stamp_s):
         """Whether transforms at a stamp were rejected of a frame between two others. A stamp of 0 means the latest."""

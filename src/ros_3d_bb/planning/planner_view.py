@@ -6,7 +6,7 @@ import numpy as np
 
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.core.labels import label_fault, score_fault
-from ros_3d_bb.core.limits import FARTHEST_M, LARGEST_M
+from ros_3d_bb.core.valid_ranges import MAX_COORDINATE_M, MAX_SIZE_M
 from ros_3d_bb.tracking.types import OUT_OF_VIEW
 
 SWATH_STEP_S = 0.1  # a person at 3 m/s moves 0.3 m, less than a body's width, so that the footprints overlap
@@ -25,12 +25,13 @@ def usable_tracks(tracks):
 def _fault_of(track):
     """Fault of a track: a value is not finite or implausibly large, or a size or step is not positive; '' if valid."""
     values = np.concatenate([track.position_m, track.velocity_mps, track.size_m, track.prediction_m.ravel()])
-    if not ((np.abs(values) < FARTHEST_M).all() and (0 < track.size_m).all() and (track.size_m < LARGEST_M).all()):
+    if not ((np.abs(values) < MAX_COORDINATE_M).all()
+            and ((0 < track.size_m) & (track.size_m < MAX_SIZE_M)).all()):
         return ('track %d has position %s, velocity %s, size %s and prediction %s; finite numbers and a size of more '
                 'than 0 and less than %g m expected' % (track.id, track.position_m, track.velocity_mps, track.size_m,
-                                                        track.prediction_m.tolist(), LARGEST_M))
-    if track.covariance is not None and not ((np.abs(track.covariance) < FARTHEST_M).all() and (
-            np.abs(track.prediction_covariance_m2) < FARTHEST_M).all()):
+                                                        track.prediction_m.tolist(), MAX_SIZE_M))
+    if track.covariance is not None and not ((np.abs(track.covariance) < MAX_COORDINATE_M).all() and (
+            np.abs(track.prediction_covariance_m2) < MAX_COORDINATE_M).all()):
         return 'track %d has a covariance that is not finite' % track.id
     if len(track.prediction_m) and not track.prediction_step_s > 0:
         return ('track %d has predictions in steps of %g s; a positive step expected'

@@ -21,7 +21,7 @@ ID_FORMAT = re.compile(r'(\d+)_\d+_\d{9}$')
 
 
 def append(folder, snapshot, label=''):
-    """Append a `frame_synchronizer.Snapshot` to the session in a folder, which is created if it does not exist.
+    """Append a `snapshots.Snapshot` to the session in a folder, which is created if it does not exist.
 
     Returns the ID of the measurement (the next free number and the stamp), and the number of measurements in the
     session. Raises ValueError if the folder is not a session, the session is of another camera, or the measurement

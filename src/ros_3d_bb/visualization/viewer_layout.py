@@ -39,7 +39,7 @@ class FrameRate(object):
 
 
 def compose(snapshot, panel_width_px, farthest_m, lines=(), warnings=()):
-    """Draw a `frame_synchronizer.Snapshot`, with lines of text and highlighted warnings below.
+    """Draw a `snapshots.Snapshot`, with lines of text and highlighted warnings below.
 
     The three panels have the width `panel_width_px`; depth is colour-coded up to `farthest_m`.
     """

@@ -5,9 +5,7 @@ always corrected in this way if there are enough positions. Recorded estimates a
 are skipped.
 """
 import argparse
-import json
 import os
-import sys
 from typing import Any, NamedTuple, Optional
 
 import numpy as np
@@ -17,7 +15,7 @@ from ros_3d_bb.estimation.box3d import plausible, truncated_edges
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.estimation.error_model import read_error_model, write_error_model
 from ros_3d_bb.sessions.session_reader import annotated_people, read_color, read_depth, read_session
-from ros_3d_bb_lab.evaluation.defaults import default_weights, scenario_path
+from ros_3d_bb_lab.evaluation.defaults import data_folder, default_weights, scenario_path, write_json
 from ros_3d_bb_lab.evaluation.error_model_fit import coverage, data_of, fit_error_model, held_out
 from ros_3d_bb_lab.evaluation.scenes import position_errors_m
 from ros_3d_bb_lab.simulation.scenario import read_scenario
@@ -170,30 +168,25 @@ def scenario_scores(path, estimator, every=5):
 def main():
     """Run the command `./run bench accuracy`."""
     arguments = _arguments()
-    try:
-        if arguments.scenarios:
-            _bench_scenarios(arguments)
-            return
-        session = read_session(arguments.data)
-        session = session._replace(frames=tuple(annotated_people(session.frames)))
-        if not session.frames:
-            raise ValueError('%s has no frame with ground truth' % arguments.data)
-        model = read_error_model(arguments.error_model) if arguments.error_model else None
-        if model is not None:
-            model.check_estimator(arguments.estimator)
-        boxes = boxes_of(session, arguments.weights if arguments.boxes == 'yolov5' else None)
-        result, ours = compare(session, boxes, estimator_named(arguments.estimator), model)
-        result.update(boxes=arguments.boxes, estimator=arguments.estimator)
-        if arguments.fit:
-            seen = np.isfinite(ours.raw_m[:, 0])
-            write_error_model(arguments.fit, fit_error_model(
-                ours.raw_m[seen], truth_of(session)[seen], source=arguments.source, estimator=arguments.estimator,
-                camera=arguments.camera, date=arguments.date))
-        if arguments.json:
-            with open(arguments.json, 'w') as stream:
-                json.dump(result, stream, indent=1)
-    except (ValueError, OSError) as error:
-        sys.exit('./run bench accuracy: %s' % error)
+    if arguments.scenarios:
+        _bench_scenarios(arguments)
+        return
+    session = read_session(arguments.data)
+    session = session._replace(frames=tuple(annotated_people(session.frames)))
+    if not session.frames:
+        raise ValueError('%s has no frame with ground truth' % arguments.data)
+    model = read_error_model(arguments.error_model) if arguments.error_model else None
+    if model is not None:
+        model.check_estimator(arguments.estimator)
+    boxes = boxes_of(session, arguments.weights if arguments.boxes == 'yolov5' else None)
+    result, ours = compare(session, boxes, estimator_named(arguments.estimator), model)
+    result.update(boxes=arguments.boxes, estimator=arguments.estimator)
+    if arguments.fit:
+        seen = np.isfinite(ours.raw_m[:, 0])
+        write_error_model(arguments.fit, fit_error_model(
+            ours.raw_m[seen], truth_of(session)[seen], source=arguments.source, estimator=arguments.estimator,
+            camera=arguments.camera, date=arguments.date))
+    write_json(arguments.json, result)
     print('%d frames at %d positions, boxes: %s, estimator: %s, calibration: %s' % (
         result['frames'], result['positions'], arguments.boxes, arguments.estimator, result['calibration']))
     print('\n'.join(table(result)))
@@ -207,15 +200,12 @@ def _bench_scenarios(arguments):
         print(results[-1]['scenario'])
         for name in ('ours', 'thesis'):
             print('  %-7s %s' % (name, '  '.join('%s %.4g' % pair for pair in sorted(results[-1][name].items()))))
-    if arguments.json:
-        with open(arguments.json, 'w') as stream:
-            json.dump({'estimator': arguments.estimator, 'scenarios': results}, stream, indent=1)
+    write_json(arguments.json, {'estimator': arguments.estimator, 'scenarios': results})
 
 
 def _arguments():
     parser = argparse.ArgumentParser(prog='./run bench accuracy', description=__doc__)
-    data = os.environ.get('ROS_3D_BB_DATA')
-    parser.add_argument('--data', default=data and os.path.join(data, 'data', 'thesis'), metavar='DIR',
+    parser.add_argument('--data', default=data_folder('thesis'), metavar='DIR',
                         help='a measurement session (default: $ROS_3D_BB_DATA/data/thesis)')
     parser.add_argument('--scenarios', nargs='+', type=scenario_path, metavar='SCENARIO',
                         help='simulated scenes instead of a session')
@@ -234,7 +224,3 @@ def _arguments():
     if arguments.boxes == 'yolov5' and not arguments.weights:
         parser.error('--boxes yolov5 needs --weights')
     return arguments
-
-
-if __name__ == '__main__':
-    main()

@@ -1,6 +1,7 @@
-"""What the benchmarks find on a machine: the cached weights, the files in config/, and its cores and software."""
+"""What benchmarks find on a machine: weights, scenarios, recorded data, its cores and software; and their output."""
 import argparse
 import glob
+import json
 import os
 import platform
 
@@ -32,6 +33,19 @@ def scenario_path(name):
 def scenario_paths(*patterns):
     """Paths of the scenarios in config/scenarios whose names match a pattern, in the order of the patterns."""
     return [path for pattern in patterns for path in sorted(glob.glob(os.path.join(SCENARIOS, pattern + '.yaml')))]
+
+
+def data_folder(name):
+    """Folder of recorded data by its name in `$ROS_3D_BB_DATA/data`; None if it does not exist."""
+    path = os.path.join(os.environ.get('ROS_3D_BB_DATA', ''), 'data', name)
+    return path if os.path.isdir(path) else None
+
+
+def write_json(path, result):
+    """Write a result to a file, if there is a path."""
+    if path:
+        with open(path, 'w') as stream:
+            json.dump(result, stream, indent=1)
 
 
 def describe_machine():

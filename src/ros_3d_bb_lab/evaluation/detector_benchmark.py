@@ -6,9 +6,7 @@ from the image to the boxes, with one thread. Scores differ between families of 
 highest F1 score is given for each network.
 """
 import argparse
-import json
 import os
-import sys
 import tempfile
 import time
 
@@ -19,7 +17,7 @@ from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
-from ros_3d_bb_lab.evaluation.defaults import default_weights, describe_machine
+from ros_3d_bb_lab.evaluation.defaults import data_folder, default_weights, describe_machine, write_json
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 
 FOUND_IOU = 0.5
@@ -153,32 +151,26 @@ def main():
     """Run the command `./run bench detector`."""
     arguments = _arguments()
     cv2.setNumThreads(1)
-    try:
-        with tempfile.TemporaryDirectory() as folder:
-            session = read_session(arguments.data or write_simulated_session(folder, *SIMULATED))
-            session = session._replace(frames=session.frames[::arguments.every])
-            networks = open_networks(arguments.weights, arguments.confidence)
-            detectors = {name: boxes_of(network) for name, network in networks.items()}
-            detectors[DEPTH] = depth_detector(session.camera)
-            result = dict(compare(session, detectors), machine=describe_machine())
-            for name, network in networks.items():
-                row = result['detectors'][name]
-                row['best_confidence'], row['best_f1'] = best_confidence(session, network)
-        if arguments.json:
-            with open(arguments.json, 'w') as stream:
-                json.dump(result, stream, indent=1)
-    except (ValueError, OSError) as error:
-        sys.exit('./run bench detector: %s' % error)
+    with tempfile.TemporaryDirectory() as folder:
+        session = read_session(arguments.data or write_simulated_session(folder, *SIMULATED))
+        session = session._replace(frames=session.frames[::arguments.every])
+        networks = open_networks(arguments.weights, arguments.confidence)
+        detectors = {name: boxes_of(network) for name, network in networks.items()}
+        detectors[DEPTH] = depth_detector(session.camera)
+        result = dict(compare(session, detectors), machine=describe_machine())
+        for name, network in networks.items():
+            row = result['detectors'][name]
+            row['best_confidence'], row['best_f1'] = best_confidence(session, network)
+    write_json(arguments.json, result)
     print('%s\n%d images, %d people' % (result['machine'], result['frames'], result['boxes']))
     print('\n'.join(table(result)))
 
 
 def _arguments():
     parser = argparse.ArgumentParser(prog='./run bench detector', description=__doc__)
-    data = os.environ.get('ROS_3D_BB_DATA')
     parser.add_argument('--weights', nargs='+', default=list(filter(None, [default_weights()])), metavar='FILE',
                         help='model files: YOLOv5 checkpoints, ONNX files (default: yolov5n.pt in the cache, if any)')
-    parser.add_argument('--data', default=data and os.path.join(data, 'data', 'thesis'), metavar='DIR',
+    parser.add_argument('--data', default=data_folder('thesis'), metavar='DIR',
                         help='measurement session (default: $ROS_3D_BB_DATA/data/thesis, or simulated)')
     parser.add_argument('--every', type=int, default=1, metavar='N', help='use every Nth image (default: 1)')
     parser.add_argument('--confidence', type=float, default=DetectionParams().confidence, metavar='P',

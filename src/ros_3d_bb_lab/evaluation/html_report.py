@@ -6,13 +6,15 @@ import mimetypes
 from ros_3d_bb_lab.evaluation.report_blocks import Figure, Heading, Paragraph
 
 PAGE = '''<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>
+<html lang="en"><head><meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1"><title>{title}</title><style>
 body {{ font: 16px/1.5 sans-serif; max-width: 54em; margin: 2em auto; padding: 0 1em; color: #222; }}
-table {{ border-collapse: collapse; margin: 0.3em 0 1.2em; font-size: 0.9em; }}
+table {{ display: block; overflow-x: auto; border-collapse: collapse; margin: 0.3em 0 1.2em; font-size: 0.9em; }}
 td, th {{ padding: 0.15em 0.8em; text-align: right; vertical-align: top; }}
 th {{ border-bottom: 1px solid #888; }} td:first-child, th:first-child {{ text-align: left; padding-left: 0; }}
 .pairs td, .pairs th {{ text-align: left; }}
 img {{ max-width: 100%; }} figure {{ margin: 1.5em 0; }}
+@media (max-width: 600px) {{ td, th {{ padding: 0.15em 0.25em; font-size: 0.85em; }} }}
 figcaption, .caption {{ color: #444; font-size: 0.9em; margin: 0.5em 0 0; }}
 </style></head><body>
 <h1>{title}</h1>

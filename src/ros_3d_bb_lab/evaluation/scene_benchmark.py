@@ -1,8 +1,6 @@
 """Benchmark of the pipeline on simulated scenes with different detectors, against ground truth."""
 import argparse
-import json
 import os
-import sys
 
 import numpy as np
 
@@ -14,7 +12,7 @@ from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb_lab.evaluation.clear_mot import ClearMatcher, score
-from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_path, scenario_paths
+from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_path, scenario_paths, write_json
 from ros_3d_bb_lab.evaluation.scenes import run_scene, score_detections
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
@@ -130,18 +128,12 @@ def result_of(steps, detector, camera=D435I_COLOR):
 def main():
     """Run the command `./run bench scenes`."""
     arguments = _parser().parse_args()
-    results = []
-    try:
-        yolov5 = yolov5_detector(arguments.weights) if arguments.weights else None
-        error_model = read_error_model(arguments.error_model) if arguments.error_model else None
-        print(COLUMNS % HEADINGS)
-        for path in arguments.scenarios:
-            results += _run(path, yolov5, error_model, arguments.every)
-        if arguments.json:
-            with open(arguments.json, 'w') as stream:
-                json.dump({'scenes': results}, stream, indent=1)
-    except (ValueError, OSError) as error:
-        sys.exit('./run bench scenes: %s' % error)
+    yolov5, results = yolov5_detector(arguments.weights) if arguments.weights else None, []
+    error_model = read_error_model(arguments.error_model) if arguments.error_model else None
+    print(COLUMNS % HEADINGS)
+    for path in arguments.scenarios:
+        results += _run(path, yolov5, error_model, arguments.every)
+    write_json(arguments.json, {'scenes': results})
 
 
 def _parser():

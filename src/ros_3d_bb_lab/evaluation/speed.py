@@ -8,9 +8,6 @@ and boxes alternately, so that other load on the machine affects both equally an
 import argparse
 import functools
 import itertools
-import json
-import os
-import sys
 import tempfile
 import time
 from typing import NamedTuple, Tuple
@@ -27,7 +24,7 @@ from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import CameraView, Detection, detections_from_boxes
 from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker
-from ros_3d_bb_lab.evaluation.defaults import default_weights, describe_machine
+from ros_3d_bb_lab.evaluation.defaults import data_folder, default_weights, describe_machine, write_json
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 
 OBJECTS = (1, 2, 5, 10, 20, 50, 100)
@@ -237,18 +234,13 @@ def table(result):
 def main():
     """Run the command `./run bench speed`."""
     arguments = _arguments()
-    try:
-        with tempfile.TemporaryDirectory() as folder:
-            session = read_session(arguments.data or write_simulated_session(folder, *SIMULATED))
-            result = speed(session, OBJECTS, arguments.images, arguments.seed)
-            colors = [read_color(frame, session.camera) for frame in session.frames[:DETECTOR_IMAGES]]
-        result['data'] = arguments.data or 'simulated'
-        result['detector'] = detector_speed(colors, arguments.weights) if arguments.weights else []
-        if arguments.json:
-            with open(arguments.json, 'w') as stream:
-                json.dump(result, stream, indent=1)
-    except (ValueError, OSError) as error:
-        sys.exit('./run bench speed: %s' % error)
+    with tempfile.TemporaryDirectory() as folder:
+        session = read_session(arguments.data or write_simulated_session(folder, *SIMULATED))
+        result = speed(session, OBJECTS, arguments.images, arguments.seed)
+        colors = [read_color(frame, session.camera) for frame in session.frames[:DETECTOR_IMAGES]]
+    result['data'] = arguments.data or 'simulated'
+    result['detector'] = detector_speed(colors, arguments.weights) if arguments.weights else []
+    write_json(arguments.json, result)
     print('%s\n%d people of %s, %d images each' % (
         result['machine'], result['people'], 'the session ' + arguments.data if arguments.data else
         'a simulated session (no --data, and ROS_3D_BB_DATA is not set)', result['images']))
@@ -257,8 +249,7 @@ def main():
 
 def _arguments():
     parser = argparse.ArgumentParser(prog='./run bench speed', description=__doc__)
-    data = os.environ.get('ROS_3D_BB_DATA')
-    parser.add_argument('--data', default=data and os.path.join(data, 'data', 'thesis'), metavar='DIR',
+    parser.add_argument('--data', default=data_folder('thesis'), metavar='DIR',
                         help='measurement session (default: $ROS_3D_BB_DATA/data/thesis, or simulated)')
     parser.add_argument('--weights', default=default_weights(), metavar='FILE',
                         help='YOLOv5 checkpoint; also measures the detector')

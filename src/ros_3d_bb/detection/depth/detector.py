@@ -17,6 +17,7 @@ from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams, find_pe
 MEAN_HEIGHT_M, MEAN_WIDTH_M = 1.7, 0.5  # assumed for people who are partly outside the image
 SURE_SCORE = 0.95  # no further HOG scores are evaluated from this score on
 MAX_HOG_AGE = 2  # number of further images for which the HOG score of a person is used
+NEARER_M, HIDDEN_SHARE = 0.3, 0.5  # of a person who hides the legs of another one, and of the width of these; chosen
 MIN_DISTANCE_M = 0.35  # between the centres of two people; closer detections are one person
 
 
@@ -90,7 +91,7 @@ class DepthPeople(object):
             if score >= self._params.min_score:
                 people.append(DepthDetection(box, score, position_m, hog, hog_age))
         self._last_people = people
-        return _merged_detections(people)
+        return _merged_detections([_completed(person, people, camera, floor) for person in people])
 
     def _hog_scores(self, pyramid, window, position_m):
         """Yield HOG scores and their ages: that of a person at the same place in the last image, then new ones."""
@@ -126,6 +127,26 @@ def box_of(blob, shape, grid, camera, floor):
         lowest_m = quantile_of(blob.window(grid.depth_m)[-3:][blob.mask[-3:]], 0.5)
         y2 = max(y2, floor.row(camera, (x1 + x2) / 2.0, lowest_m))
     return x1, y1, min(x2, camera.width), min(y2, camera.height)
+
+
+def _completed(person, people, camera, floor):
+    """Return a DepthDetection whose box ends at the floor if another of the people hides the legs.
+
+    The tracker compares heights: a box of the upper body alone would be that of a smaller person.
+    """
+    if not any(_hides_legs(other, person) for other in people):
+        return person
+    x1, y1, x2, y2 = person.box
+    soles = floor.row(camera, (x1 + x2) / 2.0, person.position_m[1])
+    return person._replace(box=(x1, y1, x2, min(max(y2, soles), camera.height)))
+
+
+def _hides_legs(other, person):
+    """Whether a nearer person is in front of most of the lower edge of a person's box."""
+    x1, _top, x2, y2 = person.box
+    left, top, right, bottom = other.box
+    in_front = other.position_m[1] < person.position_m[1] - NEARER_M and top < y2 < bottom
+    return in_front and min(x2, right) - max(x1, left) > HIDDEN_SHARE * (x2 - x1)
 
 
 def _distance_m(one_m, other_m):

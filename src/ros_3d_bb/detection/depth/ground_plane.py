@@ -47,6 +47,21 @@ class Floor(NamedTuple):
         return y * camera.fy + camera.cy
 
 
+class CameraPose(NamedTuple):
+    """Pose of a camera above the floor; the angles are those of `camera.image_rotation.mounted_camera`."""
+
+    height_m: float
+    tilt_rad: float
+    roll_rad: float
+
+
+def camera_pose_above(floors):
+    """CameraPose by the median of the Floors that were fitted to images of an upright camera."""
+    x, y, z = np.median([floor.normal for floor in floors], axis=0).tolist()
+    return CameraPose(float(np.median([floor.offset_m for floor in floors])), float(np.arctan2(-z, np.hypot(x, y))),
+                      float(np.arctan2(-x, -y)))
+
+
 def floor_from_transform(camera_from_floor):
     """Floor from the transform (4, 4) to the camera optical frame from a frame whose z = 0 plane is the floor, z up."""
     normal = camera_from_floor[:3, 2]

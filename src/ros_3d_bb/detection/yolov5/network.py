@@ -116,7 +116,7 @@ class Detect(nn.Module):
 
     def __init__(self, class_count, anchor_count, in_channels, strides):
         super(Detect, self).__init__()
-        self.columns = class_count + 5
+        self.columns, self.anchor_count = class_count + 5, anchor_count  # numbers, which torch 1.7 exports
         self.strides = strides
         self.m = nn.ModuleList([nn.Conv2d(channels, anchor_count * self.columns, 1) for channels in in_channels])
         self.register_buffer('anchors', torch.zeros(len(in_channels), anchor_count, 2))
@@ -129,7 +129,7 @@ class Detect(nn.Module):
         stride, anchors = self.strides[scale], self.anchors[scale]
         y = self.m[scale](x).float()  # half precision would round x and y of boxes to whole pixels
         batch, _, height, width = y.shape
-        y = y.view(batch, anchors.shape[0], self.columns, height, width).permute(0, 1, 3, 4, 2).sigmoid()
+        y = y.view(batch, self.anchor_count, self.columns, height, width).permute(0, 1, 3, 4, 2).sigmoid()
         column = torch.arange(width, device=y.device, dtype=y.dtype).view(1, 1, 1, width)
         row = torch.arange(height, device=y.device, dtype=y.dtype).view(1, 1, height, 1)
         center_x = (y[..., 0] * 2 - 0.5 + column) * stride

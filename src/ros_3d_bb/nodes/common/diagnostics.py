@@ -10,9 +10,11 @@ from rospy.topics import get_topic_manager
 from std_msgs.msg import Header
 
 from ros_3d_bb.core.event_counter import MOST_LAGS, EventCounter
+from ros_3d_bb.core.params import with_places
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.common.master import is_ending
 from ros_3d_bb.nodes.common.part import Part
+from ros_3d_bb.nodes.common.startup import launch_places
 from ros_3d_bb.nodes.common.subscribers import InputMonitor
 
 PERIOD_S = 1.0
@@ -46,6 +48,7 @@ class Diagnostics(EventCounter):
             inputs = InputMonitor()
             self._shown.append(inputs.values)
             self._checks.append(inputs.faults)
+        self._place_of = launch_places([part.node_name.rpartition('/')[2]])
         self._updater = NodeUpdater(part.node_name)
         self._updater.setHardwareID('none')
         self._updater.add('pipeline', self._report)
@@ -53,12 +56,13 @@ class Diagnostics(EventCounter):
 
     def note(self, event, sentence):
         """Count an event and log `sentence` as information."""
-        rospy.loginfo('%s', sentence)
+        rospy.loginfo('%s', with_places(sentence, self._place_of))
         super(Diagnostics, self).note(event, sentence)
 
     def warn(self, event, sentence):
         """Count a rejected or missing input; `sentence` states what failed, why, and what happens next."""
         self.count(event)
+        sentence = with_places(sentence, self._place_of)
         self._warning, self._warned_at = sentence, time.monotonic()
         self._log(event, sentence, WARNING_LASTS_S)
 

@@ -8,6 +8,10 @@ import rospy
 from ros_3d_bb.core.params import params_from, with_places
 from ros_3d_bb.nodes.common.master import Registration
 
+# Launch arguments for the parameter files of nodes.
+PARAMS_FILES = {'%s_node' % name: '%s_params' % name for name in (
+    'bbox3d', 'camera_pose', 'depth_detector', 'planner_bridge', 'realsense', 'tracker', 'viewer', 'yolov5')}
+PARAMS_FILES.update({'%s_node' % name: 'params' for name in ('follow', 'people_removal', 'speed_limit')})
 POLL_S = 0.05
 SETTLING_S = 1.0  # a node that has connected to one topic may still be connecting to the others
 SENDING_S = 1.0  # from the last message to the exit: rospy drops messages that it has not sent before the shutdown
@@ -26,6 +30,20 @@ def stored_params(namespace='~'):
     return rospy.get_param(namespace.rstrip('/'), {})
 
 
+def launch_places(nodes):
+    """Return a function that returns the launch argument which sets a parameter of some nodes, as text.
+
+    It is empty for a name that is not on the parameter server: then the node was started without a launch file, or the
+    name is that of a service.
+    """
+    stored = {PARAMS_FILES[node]: stored_params(rospy.resolve_name(node)) for node in nodes if node in PARAMS_FILES}
+
+    def place_of(name):
+        files = sorted(argument for argument, params in stored.items() if name in params)
+        return 'launch argument %s' % ' or '.join('%s:=FILE' % each for each in files) if files else ''
+    return place_of
+
+
 def run_node(name, node_class, run=lambda _node: rospy.spin(), parts=()):
     """Create a node, `run` it (by default until ROS shuts down) and return it.
 
@@ -39,10 +57,7 @@ def run_node(name, node_class, run=lambda _node: rospy.spin(), parts=()):
     try:
         node = node_class()
     except ValueError as error:
-        # the nodes of the pipeline have this launch argument, those of ros_3d_bb_lab do not
-        is_ours = node_class.__module__.startswith('ros_3d_bb.')
-        place = 'launch argument %s_params:=FILE' % name[:-len('_node')] if is_ours else ''
-        rospy.logfatal('%s cannot start: %s', rospy.get_name(), with_places(str(error), lambda _name: place))
+        rospy.logfatal('%s cannot start: %s', rospy.get_name(), with_places(str(error), launch_places(parts or [name])))
         sys.exit(1)
     run(node)
     return node

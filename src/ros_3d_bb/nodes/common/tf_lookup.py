@@ -69,6 +69,10 @@ class Transforms(object):
                 self._listener.news.wait(min(left_s, LONGEST_WAIT_S))
         raise type(fault)(self._explanation(frames, stamp) or str(fault))
 
+    def link_to_root(self, target_frame, frame, target_from_frame):
+        """As `TransformBuffer.link_to_root`."""
+        return self._buffer.link_to_root(target_frame, frame, target_from_frame)
+
     def close(self):
         """Unsubscribe from tf."""
         self._listener.unregister()

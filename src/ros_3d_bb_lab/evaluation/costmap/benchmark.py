@@ -5,7 +5,6 @@ planner_bridge_node and a costmap_2d_node with the people layer of config/move_b
 """
 import argparse
 import contextlib
-import json
 import os
 import sys
 import tempfile
@@ -27,8 +26,7 @@ from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb_lab.evaluation.costmap.costmap_score import Costmap, Sighting, score_costmaps
-from ros_3d_bb_lab.evaluation.costmap.picture import draw_costmap
-from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, describe_machine, scenario_path
+from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, describe_machine, scenario_path, write_json
 from ros_3d_bb_lab.evaluation.launching import free_port, running_roslaunch
 from ros_3d_bb_lab.evaluation.scene_benchmark import RANGE_M, depth_detector, yolov5_detector
 from ros_3d_bb_lab.evaluation.scenes import run_scene
@@ -179,26 +177,17 @@ def main():
     arguments = _arguments()
     print(describe_machine())
     print(COLUMNS % HEADINGS, flush=True)
-    try:
-        yolov5 = yolov5_detector(arguments.weights) if arguments.weights else None
-        scenes = [tracked_scene(name, path, yolov5) for name, path in arguments.scenes.items()]
-    except (ValueError, OSError) as error:
-        sys.exit('./run bench costmap: %s' % error)
+    yolov5 = yolov5_detector(arguments.weights) if arguments.weights else None
+    scenes = [tracked_scene(name, path, yolov5) for name, path in arguments.scenes.items()]
     results = {}
     with running_nodes():
         rospy.init_node('costmap_benchmark', disable_signals=True)
         player = Player(arguments.speed)
         player.start(scenes[0])
         for scene in scenes:
-            costmaps = player.play(scene)
-            results[scene.name] = result_of(scene, costmaps)
+            results[scene.name] = result_of(scene, player.play(scene))
             print(row(scene.name, results[scene.name]), flush=True)
-            if arguments.picture and scene is scenes[0]:
-                draw_costmap(arguments.picture, scene, min(costmaps, key=lambda costmap: abs(
-                    costmap.time_s - arguments.at)))
-    if arguments.json:
-        with open(arguments.json, 'w') as stream:
-            json.dump({'machine': describe_machine(), 'scenes': results}, stream, indent=1)
+    write_json(arguments.json, {'machine': describe_machine(), 'scenes': results})
 
 
 @contextlib.contextmanager
@@ -220,8 +209,6 @@ def _arguments():
     parser.add_argument('--weights', help='checkpoint or export of YOLOv5; without it, people are detected in depth')
     parser.add_argument('--speed', type=float, default=1.0,
                         help='speed of time; less than 1 on a busy machine (default: 1)')
-    parser.add_argument('--picture', metavar='FILE', help='image of the first scene to write')
-    parser.add_argument('--at', type=float, default=5.0, metavar='S', help='time of the picture (default: 5)')
     parser.add_argument('--json', metavar='FILE', help='file to which the results are also written')
     return parser.parse_args()
 

@@ -3,8 +3,6 @@
 The laser is that of `simulation.laser`. Scenes are tracked and played as in `benchmark`.
 """
 import argparse
-import json
-import sys
 
 import numpy as np
 import rospy
@@ -14,7 +12,7 @@ from sensor_msgs.msg import LaserScan
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb_lab.evaluation.costmap.benchmark import SCENES, Player, running_nodes, scenario_paths, tracked_scene
-from ros_3d_bb_lab.evaluation.defaults import describe_machine
+from ros_3d_bb_lab.evaluation.defaults import describe_machine, write_json
 from ros_3d_bb_lab.simulation.laser import FIELD_OF_VIEW, planar_pose, rectangles_of, scan_ranges
 from ros_3d_bb_lab.simulation.ros.driven_robot import scan_to_msg
 
@@ -109,10 +107,7 @@ def main():
     arguments = parser.parse_args()
     print(describe_machine())
     print(COLUMNS % HEADINGS, flush=True)
-    try:
-        scenes = [tracked_scene(name, path) for name, path in arguments.scenes.items()]
-    except (ValueError, OSError) as error:
-        sys.exit('./run bench laser: %s' % error)
+    scenes = [tracked_scene(name, path) for name, path in arguments.scenes.items()]
     results = {}
     with running_nodes(LAUNCH % ''.join(COSTMAP % item for item in NODES.items())):
         rospy.init_node('laser_benchmark', disable_signals=True)
@@ -126,6 +121,4 @@ def main():
             print(COLUMNS % (scene.name, result['costmaps'], '%.1f' % result['of_people'],
                              '%.1f' % result['of_people_static'], '%.0f' % result['of_room'],
                              '%.0f' % result['of_room_static']), flush=True)
-    if arguments.json:
-        with open(arguments.json, 'w') as stream:
-            json.dump({'machine': describe_machine(), 'scenes': results}, stream, indent=1)
+    write_json(arguments.json, {'machine': describe_machine(), 'scenes': results})

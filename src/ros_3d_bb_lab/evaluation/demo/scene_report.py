@@ -32,6 +32,11 @@ SIZE_IN, LINE_IN, DPI = (14.56, 14.5), 0.17, 100
 CSV_COLUMNS = ('stamp_s', 'id', 'label', 'status', 'x_m', 'y_m', 'vx_mps', 'vy_mps', 'var_x_m2', 'cov_xy_m2',
                'var_y_m2')
 TRUTH_COLOR, ROBOT_COLOR = '#aaaaaa', '#141414'
+LEGEND = ('Map: the colours are visible tracks with their IDs, grey are the true paths of people, black is the robot. '
+          'A track ID is not the number of a person: it only has to stay the same. ')
+TRUTH_LEGEND = ('Table: for each person, how long the person was in view, the share of this time with a track, the '
+                'changes of the track ID, the IDs, and the position error, RMS and largest. ')
+SEE_ALSO = 'The pages Bags and Troubleshooting of the documentation, and rosrun ros_3d_bb doctor BAG, help further.'
 
 
 class Recording(NamedTuple):
@@ -63,7 +68,8 @@ def read_recording(bag):
     if not tracks:
         reason = ('but 3D boxes: probably tf lacks the pose of the camera; rosrun ros_3d_bb doctor checks it'
                   if topics_of_cameras(bag, BOXES3D_TOPIC) else
-                  'a recorded run of simulation.launch, or a result of process_bag expected')
+                  'a recorded run of simulation.launch, or a result of process_bag expected, in which rosrun ros_3d_bb '
+                  'doctor finds the cause')
         raise ValueError('the bag has no messages on /%s; %s' % (TRACKS_TOPIC, reason))
     frames = set(message.header.frame_id for by_stamp in (truth, tracks) for message in by_stamp.values())
     if len(frames) > 1:
@@ -204,7 +210,9 @@ def write_report(bag_path, picture_path, color_topic=''):
         people, tracks = paths_of(recording)
         draw_scene(picture_path, panels_of(bag, recording, color_topic), people, tracks, recording.robot, lines)
     picture = pathlib.Path(picture_path)
+    legend = LEGEND + (TRUTH_LEGEND if recording.has_truth else '') + SEE_ALSO
     blocks = (Figure(picture.name, 'Images with 2D boxes, and paths in the map'), Paragraph(summary + '.'),
+              Paragraph(legend),
               Table('People and their tracks' if recording.has_truth else 'Tracks', header, tuple(rows)))
     title = 'Tracks in %s' % os.path.basename(bag_path)
     picture.with_suffix('.html').write_text(html_report(title, blocks, picture.parent), encoding='utf-8')

@@ -4,7 +4,6 @@ import json
 import os
 import shutil
 import subprocess
-import sys
 import tempfile
 
 import numpy as np
@@ -18,7 +17,7 @@ from ros_3d_bb.conversions.perception_msgs import NEWEST, TRACKS_TOPIC, stamp_of
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import VISIBLE, CameraView
 from ros_3d_bb_lab.evaluation.clear_mot import Moment, score
-from ros_3d_bb_lab.evaluation.defaults import describe_machine, scenario_path, scenario_paths
+from ros_3d_bb_lab.evaluation.defaults import describe_machine, scenario_path, scenario_paths, write_json
 from ros_3d_bb_lab.evaluation.gazebo.people_truth import PREDICTION_S, PeopleTruth
 from ros_3d_bb_lab.evaluation.launching import free_port, running_roslaunch
 from ros_3d_bb_lab.evaluation.scene_benchmark import score_tracks
@@ -129,14 +128,9 @@ def main():
     print(describe_machine(), flush=True)
     print(COLUMNS % TITLES)
     results = []
-    try:
-        for path in arguments.scenarios:
-            results += _run(path, detector, arguments.bags)
-        if arguments.json:
-            with open(arguments.json, 'w') as stream:
-                json.dump({'machine': describe_machine(), 'detector': detector[1], 'scenes': results}, stream, indent=1)
-    except (RuntimeError, ValueError, OSError, subprocess.SubprocessError) as error:
-        sys.exit('./run bench gazebo: %s' % error)
+    for path in arguments.scenarios:
+        results += _run(path, detector, arguments.bags)
+    write_json(arguments.json, {'machine': describe_machine(), 'detector': detector[1], 'scenes': results})
 
 
 def _parser():

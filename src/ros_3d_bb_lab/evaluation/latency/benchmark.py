@@ -9,7 +9,7 @@ import sys
 import tempfile
 from typing import NamedTuple
 
-from ros_3d_bb_lab.evaluation.defaults import default_weights, describe_machine, scenario_path
+from ros_3d_bb_lab.evaluation.defaults import default_weights, describe_machine, scenario_path, write_json
 from ros_3d_bb_lab.evaluation.latency.latency_result import LIMIT, SUBSCRIBING, result_of
 from ros_3d_bb_lab.evaluation.launching import launch
 
@@ -109,24 +109,17 @@ def main():
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # runs the cleanup, which ends all processes
     print(describe_machine())
     results = []
-    try:
-        with tempfile.TemporaryDirectory() as folder:
-            bag = arguments.bag and os.path.abspath(arguments.bag)
-            if not bag:
-                bag = os.path.join(folder, 'images.bag')
-                subprocess.check_call(['rosrun', 'ros_3d_bb', 'scenario_to_bag', arguments.scenario, bag, '--boxes',
-                                       '--images', str(IMAGES), '--compression', 'none'], stdout=subprocess.DEVNULL)
-            print(COLUMNS % TITLES, flush=True)
-            for case in cases:
-                results.append(measured(case, arguments, bag, folder))
-                print(row(results[-1]), details(results[-1]), sep='\n', flush=True)
-                if arguments.json:
-                    with open(arguments.json, 'w') as stream:
-                        json.dump({'machine': describe_machine(), 'cases': results}, stream, indent=1)
-    except KeyboardInterrupt:
-        sys.exit(130)
-    except (RuntimeError, OSError, subprocess.SubprocessError) as error:
-        sys.exit('./run bench latency: %s' % error)
+    with tempfile.TemporaryDirectory() as folder:
+        bag = arguments.bag and os.path.abspath(arguments.bag)
+        if not bag:
+            bag = os.path.join(folder, 'images.bag')
+            subprocess.check_call(['rosrun', 'ros_3d_bb', 'scenario_to_bag', arguments.scenario, bag, '--boxes',
+                                   '--images', str(IMAGES), '--compression', 'none'], stdout=subprocess.DEVNULL)
+        print(COLUMNS % TITLES, flush=True)
+        for case in cases:
+            results.append(measured(case, arguments, bag, folder))
+            print(row(results[-1]), details(results[-1]), sep='\n', flush=True)
+            write_json(arguments.json, {'machine': describe_machine(), 'cases': results})
 
 
 def _arguments():

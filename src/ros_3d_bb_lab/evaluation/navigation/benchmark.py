@@ -10,7 +10,7 @@ import tempfile
 
 import yaml
 
-from ros_3d_bb_lab.evaluation.defaults import describe_machine
+from ros_3d_bb_lab.evaluation.defaults import describe_machine, write_json
 from ros_3d_bb_lab.evaluation.launching import launch
 from ros_3d_bb_lab.evaluation.navigation.navigation_scenes import CAMERAS, GOAL_M, RATE_HZ, SCENES, scenario_of
 from ros_3d_bb_lab.evaluation.navigation.trial_result import summaries
@@ -75,22 +75,17 @@ def main():
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # runs the cleanup, which ends all processes
     print(describe_machine(), flush=True)
     trials, seeds = [], range(arguments.seed, arguments.seed + arguments.runs)
-    try:
-        _check_planners(arguments.planner)
-        with tempfile.TemporaryDirectory() as folder, multiprocessing.Pool(arguments.jobs) as pool:
-            tasks = [(scene, mode, seed, os.path.abspath(arguments.logs or folder), arguments) for seed in seeds
-                     for scene in arguments.scenes for mode in arguments.modes]
-            for trial in pool.imap_unordered(run_trial, tasks):
-                trials.append(trial)
-                print('%(scene)s, %(mode)s, seed %(seed)d: %(collisions)d collisions, goal after %(time_to_goal_s)s s, '
-                      '%(min_distance_m).2f m, %(stops)d stops' % trials[-1], flush=True)
-                _write(arguments.json, trials)
-            pool.close()  # terminated workers can wait for a lock forever
-            pool.join()
-    except KeyboardInterrupt:
-        sys.exit(130)
-    except (RuntimeError, OSError, subprocess.SubprocessError) as error:
-        sys.exit('./run bench navigation: %s' % error)
+    _check_planners(arguments.planner)
+    with tempfile.TemporaryDirectory() as folder, multiprocessing.Pool(arguments.jobs) as pool:
+        tasks = [(scene, mode, seed, os.path.abspath(arguments.logs or folder), arguments) for seed in seeds
+                 for scene in arguments.scenes for mode in arguments.modes]
+        for trial in pool.imap_unordered(run_trial, tasks):
+            trials.append(trial)
+            print('%(scene)s, %(mode)s, seed %(seed)d: %(collisions)d collisions, goal after %(time_to_goal_s)s s, '
+                  '%(min_distance_m).2f m, %(stops)d stops' % trials[-1], flush=True)
+            write_json(arguments.json, dict(summaries(trials), machine=describe_machine(), trials=trials))
+        pool.close()  # terminated workers can wait for a lock forever
+        pool.join()
     print(table(summaries(trials)))
 
 
@@ -100,12 +95,6 @@ def _check_planners(planner):
             raise RuntimeError('%s is not installed; install ros-noetic-navigation and ros-noetic-teb-local-planner, '
                                'or set ROS_3D_BB_DATA to a folder that contains planners/, from which ./run builds '
                                'them' % package)
-
-
-def _write(path, trials):
-    if path:
-        with open(path, 'w') as stream:
-            json.dump(dict(summaries(trials), machine=describe_machine(), trials=trials), stream, indent=1)
 
 
 def _arguments():

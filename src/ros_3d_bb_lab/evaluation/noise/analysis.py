@@ -70,12 +70,8 @@ class Analysis(NamedTuple):
         return [(name, cluster) for name, axis in (('Z', self.z), ('X', self.x_variance)) for cluster in axis.clusters]
 
 
-def analyse(inputs, progress=lambda share: None):
-    """Analyse `inputs`, and return an Analysis. `progress` is called with the share 0..1 that is done.
-
-    Raises ValueError if there are too few measurements.
-    """
-    progress(0.0)
+def analyse(inputs):
+    """Analyse `inputs`, and return an Analysis. Raises ValueError if there are too few measurements."""
     z, x, x_variance = (axis_statistics(clusters_of(measurements, axis), degree) for measurements, axis, degree in (
         (inputs.z, 'Z', Z_DEGREE), (inputs.x, 'X', X_DEGREE), (inputs.x_variance, 'X', X_DEGREE)))
     names = set(os.path.basename(os.path.abspath(table.name)) for table in (inputs.z, inputs.x, inputs.x_variance))
@@ -83,9 +79,7 @@ def analyse(inputs, progress=lambda share: None):
               'date': datetime.date.today().isoformat()}
     thesis_form, _reason = _or_reason(_thesis_form, z, x, x_variance, origin)
     known = inputs.x.complete()
-    progress(0.3)
     model, reason = _or_reason(fit_error_model, known.measured_m, known.truth_m, **origin)
-    progress(1.0)
     return Analysis(inputs, z, x, x_variance, share_between_positions(inputs.z, 'Z'),
                     share_between_positions(inputs.x_variance, 'X'), thesis_form, model, reason, origin['date'])
 

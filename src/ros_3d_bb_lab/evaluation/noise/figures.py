@@ -14,7 +14,7 @@ MANY_CLUSTERS = 12
 MEASURED, FITTED = '#0072b2', '#d55e00'  # different for all colour vision
 
 
-def write_figures(folder, analysis, progress=lambda share: None):
+def write_figures(folder, analysis):
     """Write the figures as PNG files into a folder (pathlib.Path). Returns {name: caption} in the order of the report.
     """
     z, x, tables = analysis.z, analysis.x, analysis.inputs
@@ -34,8 +34,7 @@ def write_figures(folder, analysis, progress=lambda share: None):
         drawings = drawings[1:]
     if analysis.model is None:
         drawings = [drawing for drawing in drawings if drawing[0] != 'sigma.png']
-    for number, (name, _caption, draw, arguments) in enumerate(drawings):
-        progress(number / len(drawings))
+    for name, _caption, draw, arguments in drawings:
         draw(folder / name, *arguments)
     return {name: caption for name, caption, _draw, _arguments in drawings}
 

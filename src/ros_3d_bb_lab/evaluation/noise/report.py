@@ -17,26 +17,23 @@ ESTIMATORS = {'foreground': 'foreground (that of bbox3d_node)', 'median': 'media
               'recorded': 'recorded (as stored with the measurements)', '': 'unknown'}
 
 
-def write_results(folder, analysis, progress=lambda share: None):
+def write_results(folder, analysis):
     """Write the report as HTML, its figures, summary.json and the error models into a folder (pathlib.Path).
 
-    Returns the figures as pairs (path, caption). The folder is created if it does not exist. `progress` is called with
-    the share 0..1 that is done. Raises OSError.
+    The folder is created if it does not exist. Raises OSError.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    captions = write_figures(folder, analysis, lambda share: progress(0.6 * share))
+    captions = write_figures(folder, analysis)
     sections = _summary, _setup, _left_out, _z, _x, _model, _distributions
     blocks = [block for section in sections for block in section(analysis)]
     blocks = list(numbered(block._replace(caption=captions[block.name]) if isinstance(block, Figure) else block
                            for block in blocks if not isinstance(block, Figure) or block.name in captions))
     (folder / 'report.html').write_text(html_report(TITLE, blocks, folder), encoding='utf-8')
-    progress(0.7)
     (folder / 'summary.json').write_text(json.dumps(summary_of(analysis), indent=1), encoding='utf-8')
     for name, model in (('error_model_thesis_form.yaml', analysis.thesis_form),
                         ('error_model.yaml', analysis.model or analysis.thesis_form)):
         if model is not None:
             write_error_model(folder / name, model)
-    return tuple((str(folder / name), caption) for name, caption in captions.items())
 
 
 def text_of(analysis):

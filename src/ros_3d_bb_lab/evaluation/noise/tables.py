@@ -127,18 +127,16 @@ def read_table(path, axis):
     return MeasurementTable(path, measured_m, values_m[:, :, 1], np.zeros(len(rows), bool), tuple(lines))
 
 
-def read_session_measurements(folder, estimator, progress=lambda share: None):
+def read_session_measurements(folder, estimator):
     """Apply an estimator to the frames with ground truth of a measurement session, and return a MeasurementTable.
 
     `estimator` is a name for `estimator_named`, or 'recorded' for the estimates stored in the session. Measurements
-    that cannot be used are `left_out`, as are rejected ones. `progress` is called with the share 0..1 of the frames
-    that are done. Raises ValueError if the session cannot be read, or no measurement can be used.
+    that cannot be used are `left_out`, as are rejected ones. Raises ValueError if the session cannot be read, or no
+    measurement can be used.
     """
     left_out, rows = [], []
     session = read_session(folder, lambda name, reason: left_out.append((name, reason)))
-    people = list(annotated_people(session.frames))
-    for number, frame in enumerate(people):
-        progress(number / len(people))
+    for frame in annotated_people(session.frames):
         try:
             rows.append((_estimate(frame, session, estimator), frame))
         except SessionError as error:

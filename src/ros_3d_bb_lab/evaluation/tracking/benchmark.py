@@ -4,10 +4,7 @@ Detection errors are as measured in the thesis. Without recordings, pedestrian t
 """
 import argparse
 import functools
-import json
 import math
-import os
-import sys
 import time
 from typing import Any, NamedTuple
 
@@ -20,6 +17,7 @@ from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb_lab.evaluation.baselines.norfair_baseline import LIDAR, LIDAR_SCORE, Norfair
 from ros_3d_bb_lab.evaluation.baselines.oracle_association import outputs_with_perfect_association
 from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker, as_it_arrived
+from ros_3d_bb_lab.evaluation.defaults import data_folder, write_json
 from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel
 from ros_3d_bb_lab.evaluation.tracking.detection_generator import SimulatedDetection
 from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
@@ -217,23 +215,16 @@ def _bench_rates(arguments):
 def main():
     """Run the command `./run bench tracking`."""
     arguments = _arguments()
-    try:
-        result = bench(arguments)
-        if arguments.json:
-            with open(arguments.json, 'w') as stream:
-                json.dump(result, stream, indent=1)
-    except (ValueError, OSError) as error:
-        sys.exit('./run bench tracking: %s' % error)
+    write_json(arguments.json, bench(arguments))
 
 
 def _arguments():
     parser = argparse.ArgumentParser(prog='./run bench tracking', description=__doc__)
-    data = os.path.join(os.environ.get('ROS_3D_BB_DATA', ''), 'data', 'trajectories')
-    parser.add_argument('--data', default=data if os.path.isdir(data) else None, metavar='DIR',
+    parser.add_argument('--data', default=data_folder('trajectories'), metavar='DIR',
                         help='folder of CSV files with the columns %s (default: $ROS_3D_BB_DATA/data/trajectories if '
                         'it exists, otherwise generated trajectories)' % ','.join(COLUMNS))
     parser.add_argument('--detections', metavar='DIR', help='track recorded 3D detections instead: a folder of '
-                        'recordings, see doc/benchmarks.md')
+                        'recordings, see doc/benchmark_methods.md')
     parser.add_argument('--rates', action='store_true', help='compare our tracker with perfect data association by '
                         'image rate instead: the pedestrians, and the recordings of --detections if it is given')
     parser.add_argument('--every', type=int, default=1, metavar='N', help='of --detections: use each N-th image')

@@ -7,15 +7,14 @@ acceleration; the constant velocity is that of the last `STEP_S` or of the last 
 """
 import argparse
 import csv
-import json
 import math
 import os
-import sys
 from typing import NamedTuple
 
 import numpy as np
 
 from ros_3d_bb.tracking.tracker import Tracker
+from ros_3d_bb_lab.evaluation.defaults import data_folder, write_json
 from ros_3d_bb_lab.evaluation.tracking.metrics import WITHIN_95
 from ros_3d_bb_lab.evaluation.tracking.prediction_benchmark import (HORIZON_S, PARAMS, predicted, step_velocity_mps,
                                                                     tracked)
@@ -137,19 +136,12 @@ def bench(folder, seed):
 def main():
     """Run the command `./run bench prediction`."""
     arguments = _arguments()
-    try:
-        result = bench(arguments.data, arguments.seed)
-        if arguments.json:
-            with open(arguments.json, 'w') as stream:
-                json.dump(result, stream, indent=1)
-    except (ValueError, OSError) as error:
-        sys.exit('./run bench prediction: %s' % error)
+    write_json(arguments.json, bench(arguments.data, arguments.seed))
 
 
 def _arguments():
     parser = argparse.ArgumentParser(prog='./run bench prediction', description=__doc__)
-    data = os.path.join(os.environ.get('ROS_3D_BB_DATA', ''), 'data', 'vru')
-    parser.add_argument('--data', default=data if os.path.isdir(data) else None, metavar='DIR',
+    parser.add_argument('--data', default=data_folder('vru'), metavar='DIR',
                         help='folder with a folder of CSV files for each kind of motion, with the columns %s (default: '
                         '$ROS_3D_BB_DATA/data/vru if it exists)' % ','.join(COLUMNS))
     parser.add_argument('--seed', type=int, default=0, metavar='N', help='random seed of the noise (default: 0)')

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.sessions.frame_synchronizer import Snapshots
+from ros_3d_bb.sessions.snapshots import Snapshots
 
 MS = NS // 1000
 PERIOD = 33 * MS

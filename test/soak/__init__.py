@@ -1,1 +1,0 @@
-"""Soak test of the whole graph with faults: `./run soak`."""
