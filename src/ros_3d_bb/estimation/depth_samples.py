@@ -34,6 +34,9 @@ EDGE_PERCENT = 5  # of the samples ignored at the left and at the right; chosen:
 # Chosen: with it, simulated arms and bending move the axis by at most 0.06 m, and the positions of cylinders do not
 # depend on which of their pixels have depth.
 TRUNK_HALF_WIDTH_M, TRUNK_STEPS = 0.25, 4
+# Chosen: the axis of a person is at most this far from the middle of the trunk. With less, the errors in the thesis
+# frames grow.
+BESIDE_TRUNK_M = 0.03
 # Chosen: samples within this distance of the middle of the trunk are above it; a larger share of them in a row is on a
 # head than on raised arms; number of samples of background above it.
 HEAD_HALF_WIDTH_M, LEAST_HEAD, LEAST_ABOVE = 0.1, 0.55, 4
@@ -131,12 +134,16 @@ class RectSamples(object):
 
     def edges(self, on_body, lowest_m=None):
         """Left and right edge of the body whose samples are given, and the middle of its trunk, metres; those above
-        `lowest_m`, if there are any."""
+        `lowest_m`, if there are any. If the mean is near the middle of the edges, it stands for the trunk."""
         if lowest_m is not None:
             above = on_body & (self._along(1) < lowest_m)
             on_body = above if above.any() else on_body
         positions = self._along(0).compress(on_body)
-        return edges(positions) + (middle_of_trunk(positions),)
+        left_m, right_m = edges(positions)
+        trunk_m = positions.mean()
+        if abs(trunk_m - (left_m + right_m) / 2) > BESIDE_TRUNK_M:
+            trunk_m = middle_of_trunk(positions, trunk_m)
+        return left_m, right_m, trunk_m
 
     def pixels_above_head(self, on_body, middle_m, layer_m):
         """Number of pixels from the upper edge of the rectangle to the head above the middle of the trunk, which raised
@@ -269,11 +276,10 @@ def _median(ranks, low, high):
     return (bisect_right(ranks, (middle - 1) // 2) + bisect_right(ranks, middle // 2)) // 2
 
 
-def middle_of_trunk(positions):
+def middle_of_trunk(positions, middle_m):
     """Middle of the densest part of lateral positions (n,), metres, by mean shift (Comaniciu and Meer, 2002) with the
-    weights 1 - (d / `TRUNK_HALF_WIDTH_M`)^2 at distances d.
+    weights 1 - (d / `TRUNK_HALF_WIDTH_M`)^2 at distances d, from `middle_m` on.
     """
-    middle_m = positions.mean()
     for _step in range(TRUNK_STEPS):
         from_middle_m = positions - middle_m
         weights = np.maximum(1 - (from_middle_m / TRUNK_HALF_WIDTH_M) ** 2, 0)

@@ -10,17 +10,16 @@ import numpy as np
 from ros_3d_bb.core.labels import PERSON
 from ros_3d_bb.estimation.box3d import (Box3D, complete_truncated_extent, slopes_down, truncated_edges,
                                         without_distortion)
-from ros_3d_bb.estimation.depth_samples import BODY_HALF_DEPTH_MM, FEET_M, LOOKS_DOWN, RectSamples, camera_rays
+from ros_3d_bb.estimation.depth_samples import (BESIDE_TRUNK_M, BODY_HALF_DEPTH_MM, FEET_M, LOOKS_DOWN, RectSamples,
+                                                camera_rays)
 from ros_3d_bb.estimation.overlaps import Overlaps
 
 LEAST_MEASURED = 0.02  # minimum share of the samples with depth for an estimate; chosen: a lidar gives twice as many
 # Minimum share of the weight of all samples in the layer for an estimate. Chosen: what a depth camera measures beside a
 # person who is too near for it has at most 0.014 in the approach scenes.
 LEAST_SHARE = 0.02
+FEW = 0.2  # share of the samples from which on a layer has more than `LEAST_SHARE` of the weight, wherever it is
 LEAST_SUPPORT = 0.1  # minimum share of the samples with depth in the layer for an estimate; chosen
-# Chosen: the axis of a person is at most this far from the middle of the trunk. With less, the errors in the thesis
-# frames grow.
-BESIDE_TRUNK_M = 0.03
 TALL_M, ARMS_ABOVE_M = 1.8, 0.12  # chosen: people who appear taller may raise their arms so far above their heads
 LEAST_WIDTH_M = 0.05  # chosen: of a body that is one pixel wide
 FILLED = 0.4  # minimum share of both sides of a rectangle that background behind an object fills; chosen
@@ -109,7 +108,7 @@ def _visible_extents(samples, flat_px, geometry, may_repeat):
     if support < LEAST_SUPPORT:
         return None
     on_body = samples.on_body(layer)
-    if samples.share(on_body) < LEAST_SHARE:
+    if count < FEW * on_body.size and samples.share(on_body) < LEAST_SHARE:
         return None
     if may_repeat and _fills_sides(on_body.reshape(samples.shape)):
         return None
