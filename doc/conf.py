@@ -24,13 +24,15 @@ KEYWORDS = {
     'doc/cameras': 'multiple multi-camera', 'doc/campaign': 'calibration calibrate ground truth',
     'doc/container': 'docker ubuntu', 'doc/detectors': 'license human pedestrian CUDA TensorRT Jetson',
     'doc/frames_and_time': 'localization synchronized timestamp clock center',
-    'doc/installing': 'apt dependencies Ubuntu uninstall', 'doc/jackal': 'Husky Clearpath autostart',
+    'doc/installing': 'apt dependencies Ubuntu uninstall', 'doc/jackal': 'Husky Clearpath autostart boot systemd wifi',
     'doc/licences': 'license licensing', 'doc/other_cameras': 'color synchronized Kinect',
-    'doc/planners': 'navigation obstacle avoidance collision human-aware safety SLAM',
-    'doc/questions': 'pandas region zone mask static furniture follow re-identification alternatives humble ROS2',
+    'doc/planners': 'navigation obstacle avoidance collision human-aware safety SLAM lidar gmapping',
+    'doc/questions': 'pandas region zone mask static furniture follow re-identification alternatives humble ROS2 '
+                     'reset cpp',
     'doc/realsense': 'D435 D435i D455 L515', 'doc/robot': 'color tilted height floor slow fps performance',
     'doc/rviz': 'visualization display', 'doc/security': 'privacy GDPR',
-    'doc/topics': 'API interface subscriber message', 'doc/tracking': 'MOT SORT reid re-identification neighbor',
+    'doc/topics': 'API interface subscriber message cpp roscpp horizon trajectory',
+    'doc/tracking': 'MOT SORT reid re-identification neighbor',
     'doc/troubleshooting': 'jump drift ghost false positives slow error', 'doc/tuning': 'settings parameters yaml'}
 FOLDERS = {'msg': 'doc/messages.md', 'config': 'doc/nodes/index.md'}
 extensions = ['myst_parser']
