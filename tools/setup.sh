@@ -79,7 +79,7 @@ build() {
   link_into_workspace
   catkin_make --directory "$workspace" -DPYTHON_EXECUTABLE="$venv/bin/python3" \
     -Dros_3d_bb_LEAVE_OUT_TESTS="$({ [ -n "${platform:-}" ] || is_debian_11; } && echo ON || echo OFF)" \
-    -Dros_3d_bb_TEST_PLANNERS="$([ -d "${ROS_3D_BB_DATA:-}/planners" ] && echo ON || echo OFF)" \
+    -Dros_3d_bb_TEST_PLANNERS="$([ -z "${platform:-}" ] && [ -d "${ROS_3D_BB_DATA:-}/planners" ] && echo ON || echo OFF)" \
     > "$workspace/build.log" 2>&1 || {
     cat "$workspace/build.log"; say "the build failed; its log is above"; exit 1; }
   [ -n "${platform:-}" ] || link_common_path
