@@ -29,6 +29,7 @@ FIRST_LAYER_SHARE = 0.5
 # Chosen: with fewer samples of the outline, it is not known what surrounds the object. What fills the outline keeps
 # this share of its weight, because a rectangle may be smaller than its object.
 LEAST_OUTLINE, LEAST_INSIDE = 10, 0.3
+OUTLINE_SIGMAS = 2  # chosen: parts of the outline that are no larger than chance count nothing, as of far, noisy people
 EDGE_PERCENT = 5  # of the samples ignored at the left and at the right; chosen: arms, flying pixels
 # Half width of the kernel that finds the trunk, the densest part of a body with stretched arms, and number of steps.
 # Chosen: with it, simulated arms and bending move the axis by at most 0.06 m, and the positions of cylinders do not
@@ -223,7 +224,7 @@ def nearest_dominant_layer(distances_mm, weights, outline=()):
     """The Layer of the object in a rectangle: the nearest dominant one in the weighted histogram of the distances (n,).
 
     What fills the outline of the rectangle, the distances with the numbers `outline`, surrounds the object: the weight
-    that a layer would have if all distances were like those of the outline is subtracted from its own, up to
+    that a layer would surely have if all distances were like those of the outline is subtracted from its own, up to
     1 - `LEAST_INSIDE` of it. Returns None if no distance is known.
     """
     nearest_mm = int(distances_mm.min()) if distances_mm.size else UNKNOWN_MM
@@ -252,11 +253,13 @@ def _start_of_layer(distances_mm, weights, nearest_mm, outline):
     # Differences are modulo 2 ** 16: unknown distances are in the first bins, or after the last one.
     numbers = (distances_mm - np.uint16((nearest_mm - BIN_MM * _EMPTY_BINS) % 2 ** 16)) // np.uint16(BIN_MM)
     layers, total = _layer_sums(numbers, weights, bins)
+    inside = layers
     if len(outline) >= LEAST_OUTLINE:
         around, known = _layer_sums(numbers[outline], None, bins)
         if known >= LEAST_OUTLINE:
-            layers = np.maximum(layers - around * (total / known), LEAST_INSIDE * layers)
-    first = int((layers >= FIRST_LAYER_SHARE * layers.max()).argmax())
+            surely = np.maximum(around - OUTLINE_SIGMAS * np.sqrt(around), 0)  # as of a Poisson distribution
+            inside = np.maximum(layers - surely * (total / known), LEAST_INSIDE * layers)
+    first = int((inside >= FIRST_LAYER_SHARE * inside.max()).argmax())
     best = first + int(layers[first:first + LAYER_BINS].argmax())
     return nearest_mm + BIN_MM * (best - LAYER_BINS // 2)
 
