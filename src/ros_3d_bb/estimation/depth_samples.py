@@ -39,8 +39,9 @@ TRUNK_HALF_WIDTH_M, TRUNK_STEPS = 0.25, 4
 # frames grow.
 BESIDE_TRUNK_M = 0.03
 # Chosen: samples within this distance of the middle of the trunk are above it; a larger share of them in a row is on a
-# head than on raised arms; number of samples of background above it.
-HEAD_HALF_WIDTH_M, LEAST_HEAD, LEAST_ABOVE = 0.1, 0.55, 4
+# head than on raised arms; number of samples of background above it; share of samples of nearer objects, which may hide
+# the head or one side of the trunk.
+HEAD_HALF_WIDTH_M, LEAST_HEAD, LEAST_ABOVE, MOST_IN_FRONT = 0.1, 0.55, 4, 0.05
 # Chosen: a camera with more tilt (sine) sees the floor beside the feet, which is as far away as the body, this high.
 LOOKS_DOWN, FEET_M = np.sin(np.radians(10)), 0.3
 
@@ -148,9 +149,13 @@ class RectSamples(object):
 
     def pixels_above_head(self, on_body, middle_m, layer_m):
         """Number of pixels from the upper edge of the rectangle to the head above the middle of the trunk, which raised
-        arms fill in part; 0 if it is not known that background fills the rest."""
+        arms fill in part; 0 if it is not known that background fills the rest, or if a nearer object is in front."""
+        ahead_m = self._along(2)
+        is_in_front = (ahead_m > 0) & (ahead_m < layer_m - BODY_HALF_DEPTH_MM / 1000)
+        if is_in_front.mean() > MOST_IN_FRONT:
+            return 0
         with np.errstate(divide='ignore', invalid='ignore'):  # without depth
-            across_m = self._along(0) * (layer_m / self._along(2))
+            across_m = self._along(0) * (layer_m / ahead_m)
         is_above_trunk = (np.abs(across_m - middle_m) <= HEAD_HALF_WIDTH_M) & (self._ahead_mm < UNKNOWN_MM)
         counts, body = (np.count_nonzero(each.reshape(self.shape), axis=1)
                         for each in (is_above_trunk, is_above_trunk & on_body))
