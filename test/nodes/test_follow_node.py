@@ -106,6 +106,7 @@ def test_the_robot_stops_when_the_tracks_stop_and_the_node_is_silent(witness):
         assert witness.velocities.stays_at(count, 1.0)
     finally:
         os.kill(pid, signal.SIGCONT)
+    rospy.ServiceProxy('follow_node/enable', SetBool)(True)  # the person may be lost
     wait_until(lambda: speed(witness) > 0.1, 'motion with new tracks', STARTING_S)
 
 
