@@ -97,3 +97,13 @@ def test_boxes_that_never_become_a_track_are_counted():
     assert tracker.untracked_boxes == 3
     tracker.reset()
     assert not tracker.untracked_boxes
+
+
+@pytest.mark.parametrize('gap_s', [5.0, 3600.0, 6.3e7])
+@pytest.mark.parametrize('y', [-1.3, -0.4, 0.7])
+def test_a_person_after_a_gap_between_images_gets_a_new_id(gap_s, y):
+    """Any box would be within reach after it, and the covariance of the track is too large for an update."""
+    tracker = Tracker()
+    before = play(10, 1.0, lambda _time_s: [(4.0, y)], tracker)
+    after = [tracker.update(START_NS + int((gap_s + number / 10) * NS), [at(4.0, y)], VIEW) for number in range(10)]
+    assert after[-1] and not ids(before) & ids(after)

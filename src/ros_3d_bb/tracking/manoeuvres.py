@@ -22,6 +22,7 @@ BESIDE_M = 0.1  # difference of two boxes of a standing person
 RISING_MPS = 2.0  # of heads: people who sit down, stand up or bend are slower
 BESIDE_SIGMAS = 2.0  # difference of the heads of two boxes of a standing person, relative to `height_sigma`
 SETTLED_NS = NS // 2  # the velocity of a track is known this long after its first detection
+LONGEST_NS = NS  # between two images; chosen: after longer, anyone may be within reach
 
 
 def match_manoeuvres(tracks, measurements, matches, latest_ns, stamp_ns, height_sigma_m):
@@ -30,7 +31,7 @@ def match_manoeuvres(tracks, measurements, matches, latest_ns, stamp_ns, height_
     `matches` are those of the association, `latest_ns` is the stamp of the latest image of the camera. The velocities
     of the tracks become as uncertain as their motion to the measurement.
     """
-    seen = [track for track in tracks if latest_ns <= track.last_ns < stamp_ns]
+    seen = [track for track in tracks if max(latest_ns, stamp_ns - LONGEST_NS) <= track.last_ns < stamp_ns]
     matched = set(id(part) for match in matches for part in match)
 
     def is_within_reach(track, measurement):
