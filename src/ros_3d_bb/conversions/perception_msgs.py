@@ -12,8 +12,8 @@ from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 from ros_3d_bb import msg
 from ros_3d_bb.camera.camera_model import Camera, transform_from
 from ros_3d_bb.core.labels import PERSON, label_fault, score_fault, usable_label
-from ros_3d_bb.core.valid_ranges import MAX_COORDINATE_M, MAX_SIZE_M
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.core.valid_ranges import MAX_COORDINATE_M, MAX_SIZE_M
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.tracking.types import TrackedObject

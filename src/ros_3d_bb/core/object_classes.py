@@ -6,8 +6,8 @@ import numpy as np
 import yaml
 
 from ros_3d_bb.core.labels import PEOPLE, PERSON, label_fault
-from ros_3d_bb.core.valid_ranges import MAX_SIZE_M
 from ros_3d_bb.core.params import nearest_name
+from ros_3d_bb.core.valid_ranges import MAX_SIZE_M
 from ros_3d_bb.core.yaml_loader import load_yaml
 
 MAX_CLASSES, MAX_IN_GROUP = 200, 8
