@@ -19,7 +19,7 @@ from ros_3d_bb_lab.simulation.scene_objects import GAP_M, PushedMotion, object_m
 D435I_COLOR = Camera(640, 480, 614.686, 614.842, 319.199, 242.08)  # camera of the measurements in the thesis
 FRONT_FROM_OPTICAL = transform_from((0, 0, 0), OPTICAL_ROTATION)
 SHADOW_RADIUS_M = 0.28
-STEP_S = 0.01  # maximum time between two states of the robot in ROS
+STEP_S = 0.02  # maximum time between two states of the robot in ROS, as in the odometry of a Jackal
 MIN_VISIBLE = 0.25  # minimum share of the body in the image of a person with the status VISIBLE
 MOVING_MPS = 0.05
 PREDICTION_S, PREDICTION_STEP_S = 2.0, 0.25

@@ -10,7 +10,7 @@ from ros_3d_bb_lab.simulation.collision import Rectangle
 CELL_M = 0.05
 OCCUPIED = 100
 STANDING_MPS, DRIVING_MPS = 0.05, 0.15
-CONTACT_SPEEDS = 5  # odometry of 50 ms
+CONTACT_SPEEDS = 3  # odometry of 60 ms
 SHINS_M = 0.15  # radius of a person at the height of a planar laser, both legs
 POINT_STEP_PX, FARTHEST_POINT_M = 8, 6.0
 

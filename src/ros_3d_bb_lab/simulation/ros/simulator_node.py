@@ -61,7 +61,7 @@ class SimulatorNode(object):
     """Play a scenario: colour, aligned depth, camera_info, tf from the map to the camera, and ground truth.
 
     If the node publishes the time (~publish_clock), time waits for images on slow machines; otherwise late images are
-    skipped. Time and tf do not depend on the rate of the images: they are published 100 times per second, and with the
+    skipped. Time and tf do not depend on the rate of the images: they are published 50 times per second, and with the
     stamp of each image. If there are several cameras, the name of the camera precedes its topics, for example
     front/color/image_raw.
 
