@@ -14,11 +14,11 @@ from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS, topic_of
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
-from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, camera_from_msg, time_from, transform_from_msg
+from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, TRACKS_TOPIC, camera_from_msg, time_from, transform_from_msg
 from ros_3d_bb.conversions.planner_msgs import points_to_msg
 from ros_3d_bb.core.params import SET_BY_LAUNCH, Param, parameters
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.msg import TrackedObjectArray
+from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb_lab.evaluation.navigation.trial_result import (CELL_M, SHINS_M, Pace, VisiblePeople, distance_m,
                                                               occupancy, points_of, stops, was_driving)
@@ -42,6 +42,7 @@ class NavigationTrialParams(NamedTuple):
     goal_x: float = Param(0.0, limits=(-1000, 1000))
     goal_y: float = Param(0.0, limits=(-1000, 1000))
     tracks: bool = Param(False, 'Whether the time waits for tracks.', section=SET_BY_LAUNCH)
+    boxes: bool = Param(False, 'Whether the time waits for the 3D boxes of each camera.', section=SET_BY_LAUNCH)
     cloud: bool = Param(False, 'Whether the points of the depth images are published.', section=SET_BY_LAUNCH)
     visible: bool = Param(False, 'Whether the true tracks of visible people are published.', section=SET_BY_LAUNCH)
     scan: bool = Param(False, 'Whether the scan of a planar laser is published.', section=SET_BY_LAUNCH)
@@ -69,6 +70,8 @@ class NavigationTrialNode(object):
         Commands of move_base, which show how far it has got.
     ros_3d_bb/tracks : ros_3d_bb/TrackedObjectArray
         Tracks, which show how far the tracker has got; only with ~tracks.
+    ros_3d_bb/bb_3d : ros_3d_bb/BoundingBox3DArray
+        3D boxes of each camera of the scenario, which show how far its nodes have got; only with ~boxes.
     camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
         Depth images of each camera of the scenario; only with ~cloud.
     camera/aligned_depth_to_color/camera_info : sensor_msgs/CameraInfo
@@ -110,8 +113,10 @@ class NavigationTrialNode(object):
         rospy.Subscriber('cmd_vel', Twist, lambda _message: self._pace.heard('commands', self._now_ns()))
         rospy.Subscriber('move_base/local_costmap/costmap', OccupancyGrid, self._on_costmap)
         if self._params.tracks:
-            rospy.Subscriber(TRACKS_TOPIC, TrackedObjectArray,
-                             lambda message: self._pace.heard('tracks', message.header.stamp.to_nsec()))
+            self._wait_for('tracks', TRACKS_TOPIC, TrackedObjectArray)
+        if self._params.boxes:
+            for mount in self._scenario.robot.mounts:
+                self._wait_for('boxes ' + mount.name, topic_of(mount.name, BOXES3D_TOPIC), BoundingBox3DArray)
         if self._params.visible:
             self._visible = VisiblePeople(len(self._scenario.robot.mounts))
             self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=10)
@@ -122,6 +127,9 @@ class NavigationTrialNode(object):
         if self._params.cloud:
             for mount in self._scenario.robot.mounts:
                 self._convert_depth_of(mount.name)
+
+    def _wait_for(self, source, topic, kind):
+        rospy.Subscriber(topic, kind, lambda message: self._pace.heard(source, message.header.stamp.to_nsec()))
 
     def _convert_depth_of(self, camera):
         cloud_pub = rospy.Publisher(topic_of(camera, 'camera/points'), PointCloud2, queue_size=1)
@@ -158,7 +166,9 @@ class NavigationTrialNode(object):
 
     def _sources(self):
         """Names of the inputs of move_base for which the time waits."""
-        return [name for name in ('tracks', 'cloud', 'scan') if getattr(self._params, name)]
+        cameras = self._scenario.robot.mounts if self._params.boxes else ()
+        return ([name for name in ('tracks', 'cloud', 'scan') if getattr(self._params, name)]
+                + ['boxes ' + mount.name for mount in cameras])
 
     def _started(self):
         """Wait until everything runs. Returns whether it does."""
