@@ -100,6 +100,12 @@ def test_a_pole_before_an_arm_does_not_occlude_the_person():
     assert place(3, 0, with_depth(depth_mm)) == VISIBLE
 
 
+@pytest.mark.parametrize('x,depth_mm,expected', [
+    (0.9, 850, OUT_OF_VIEW), (0.9, 4000, VISIBLE), (0.9, 0, VISIBLE), (3, 2950, VISIBLE)])
+def test_a_person_too_near_for_most_of_the_body_is_expected_only_where_the_depth_shows_nobody(x, depth_mm, expected):
+    assert place(x, 0, with_depth(np.full((480, 640), depth_mm))) == expected
+
+
 def test_depths_towards_points_outside_the_image_are_nan():
     depth_mm = np.arange(480 * 640).reshape(480, 640) % 5000 + 1
     depth = DepthImage(depth_mm.astype(np.uint16), 0.001)

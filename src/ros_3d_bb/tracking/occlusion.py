@@ -17,6 +17,7 @@ from ros_3d_bb.tracking.types import NEARER_M, OCCLUDED, OUT_OF_VIEW, VISIBLE, C
 EDGE_RAD = 0.04  # people this close to the image border are not detected reliably
 NEAREST_M = 0.45  # neither are people this close to the camera
 LEAST_IN_IMAGE = 0.2  # minimum share of the body axis inside the image for a person to be detected
+RELIABLE_IN_IMAGE = 0.5  # detectors often miss a person of whom the image shows less
 AXIS_SAMPLES = np.linspace(-0.48, 0.48, 11)  # samples of the body axis, as fractions of the height from the centre
 BODY_RADIUS_M = 0.27
 SEEN_BESIDE = 0.2  # an occluding person leaves at most this share of a half width visible: too narrow for a detector
@@ -109,16 +110,20 @@ def classify_visibility(view, positions_m, sizes_m, others_m, max_range_m):
     """Classify the visibility (n,) of people with centres and extents (n, 3) in a CameraView.
 
     VISIBLE: a detection is expected. OCCLUDED: by a person at one of the centres `others_m` (m, 3), which may contain
-    the people themselves, or by something nearer in the depth image. OUT_OF_VIEW: also beyond the detector's range.
+    the people themselves, or by something nearer in the depth image. OUT_OF_VIEW: also beyond the detector's range, or
+    with so little of the body in the image that detectors often miss it, while the depth shows that it is there.
     """
     distances_m, bearings = view.bearings(positions_m)
     visibility = np.full(len(positions_m), VISIBLE)
     visibility[_behind_people(distances_m, bearings, *view.bearings(others_m))] = OCCLUDED
-    visibility[_out_of_view(view, positions_m, sizes_m, distances_m, bearings, max_range_m)] = OUT_OF_VIEW
+    shares = _shares_in_image(view, positions_m, sizes_m[:, 2], bearings)
+    visibility[_out_of_range(view, positions_m, sizes_m, distances_m, max_range_m)
+               | (shares < LEAST_IN_IMAGE)] = OUT_OF_VIEW
     undecided = np.flatnonzero(visibility == VISIBLE)
     if view.depth_at is not None and len(undecided):
-        hidden = _behind_objects(view, positions_m[undecided], sizes_m[undecided])
+        hidden, present = _in_depth(view, positions_m[undecided], sizes_m[undecided])
         visibility[undecided[hidden]] = OCCLUDED
+        visibility[undecided[present & (shares[undecided] < RELIABLE_IN_IMAGE)]] = OUT_OF_VIEW
     return visibility
 
 
@@ -147,22 +152,21 @@ def depths_towards(camera, depth, points):
     return np.where(inside & measured, depths_m, np.nan)
 
 
-def _out_of_view(view, positions_m, sizes_m, distances_m, bearings, max_range_m):
-    """People that the camera cannot detect, (n,) bool: too close, too far, or with too little of the body in the image.
-    """
+def _out_of_range(view, positions_m, sizes_m, distances_m, max_range_m):
+    """People too close to the camera or too far from it, (n,) bool."""
     above_m = np.abs(positions_m[:, 2] - view.fixed_from_camera[2, 3]) - sizes_m[:, 2] / 2
     distances_m = np.hypot(distances_m, np.maximum(above_m, 0))
-    outside = (distances_m < NEAREST_M) | (distances_m > max_range_m)
-    if view.intrinsics is None:
-        return outside | (np.abs(bearings) > np.pi / 2)
-    return outside | (_share_in_image(view, positions_m, sizes_m[:, 2]) < LEAST_IN_IMAGE)
+    return (distances_m < NEAREST_M) | (distances_m > max_range_m)
 
 
-def _share_in_image(view, positions_m, heights_m):
+def _shares_in_image(view, positions_m, heights_m, bearings):
     """Share (n,) of the axes of upright bodies inside the image, less a margin of `EDGE_RAD`, regardless of occlusion.
 
-    Points for which the lens distortion defines no pixel count as outside.
+    Points for which the lens distortion defines no pixel count as outside. Without intrinsics, the image shows
+    everything ahead.
     """
+    if view.intrinsics is None:
+        return (np.abs(bearings) <= np.pi / 2).astype(float)
     camera, rotation = view.intrinsics, view.fixed_from_camera[:3, :3]  # its inverse is its transpose
     centers = (positions_m - view.fixed_from_camera[:3, 3]).dot(rotation)
     points = centers[:, None] + (AXIS_SAMPLES * heights_m[:, None])[..., None] * rotation[2]
@@ -186,8 +190,10 @@ def _half_widths(distances_m):
     return np.arcsin(np.minimum(BODY_RADIUS_M / np.maximum(distances_m, 0.01), 1))
 
 
-def _behind_objects(view, positions_m, sizes_m):
-    """People occluded by objects, (n,) bool: most of the depth measured towards the body is clearly nearer."""
+def _in_depth(view, positions_m, sizes_m):
+    """People occluded by objects, and people who are there, (n,) bool each: most of the depth measured towards the body
+    is clearly nearer, or that of something at its distance.
+    """
     rotation = view.fixed_from_camera[:3, :3]  # its inverse is its transpose
     centers = (positions_m - view.fixed_from_camera[:3, 3]).dot(rotation)
     right = rotation.T.dot((view.ahead[1], -view.ahead[0], 0))
@@ -196,5 +202,8 @@ def _behind_objects(view, positions_m, sizes_m):
     points = centers[:, None] + offsets
     depths_m = view.depth_at(points.reshape(-1, 3)).reshape(len(centers), ACROSS.size)
     known = np.isfinite(depths_m)
-    nearer = known & (np.where(known, depths_m, 0) < points[..., 2] - HIDDEN_BEHIND_M)
-    return nearer.sum(axis=1) > HIDDEN_SHARE * np.maximum(known.sum(axis=1), ACROSS.size / 3.0)
+    behind_m = np.where(known, points[..., 2] - depths_m, np.nan)
+    with np.errstate(invalid='ignore'):  # nan is neither
+        nearer, near = behind_m > HIDDEN_BEHIND_M, np.abs(behind_m) <= HIDDEN_BEHIND_M
+    counts = np.maximum(known.sum(axis=1), ACROSS.size / 3.0)
+    return nearer.sum(axis=1) > HIDDEN_SHARE * counts, near.sum(axis=1) > HIDDEN_SHARE * counts
