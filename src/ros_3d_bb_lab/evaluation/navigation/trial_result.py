@@ -23,7 +23,7 @@ class Pace(object):
     """
 
     LEAD_S = 0.2
-    PATIENCE_S = 2.0
+    PATIENCE_S = 0.5
 
     def __init__(self):
         self._heard_ns, self._needed, self._limit_ns, self._raised_s = {}, [], None, None
