@@ -294,6 +294,16 @@ def test_camera_pose_starts_the_node_and_gives_the_floor(launch_file, more):
     assert parameters['/depth_detector_node/floor_height'] == 0 and parameters['/tracker_node/target_frame'] == 'map'
 
 
+def test_the_floor_and_the_error_model_can_be_none():
+    """roslaunch ignores arguments without a value."""
+    parameters, _nodes = loaded('pipeline.launch', 'detector:=depth', 'floor_frame:=none')
+    assert parameters['/bbox3d_node/floor_frame'] == parameters['/depth_detector_node/floor_frame'] == ''
+    assert loaded('pipeline.launch', 'floor_frame:=none')[0]['/yolov5_node/floor_frame'] == ''
+    parameters, _nodes = loaded('simulation.launch', 'rviz:=false', 'error_model:=none')
+    assert parameters['/bbox3d_node/floor_frame'] == 'base_link'
+    assert not [name for name in parameters if name.endswith('/error_model')]
+
+
 def test_the_transform_that_the_doctor_advises_is_that_of_the_arguments():
     pose, _parent, _child = pose_in('0 0 1.2 -1.5708 0 -1.6708 map optical'.split())
     np.testing.assert_allclose(pose, mounted_camera(1.2, 0.1, 0), atol=1e-4)

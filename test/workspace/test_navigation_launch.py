@@ -69,7 +69,10 @@ def test_the_global_costmap_can_have_no_map_or_a_cost_around_people(name, output
 def test_a_file_of_the_user_takes_precedence(tmp_path):
     path = tmp_path / 'mine.yaml'
     path.write_text('DWAPlannerROS: {max_vel_x: 0.4}')
-    parameters, _nodes = loaded('navigation.launch', 'params:=%s' % path)
+    bridge = tmp_path / 'bridge.yaml'
+    bridge.write_text('timeout: 3.0')
+    parameters, _nodes = loaded('navigation.launch', 'params:=%s' % path, 'planner_bridge_params:=%s' % bridge)
+    assert parameters[BRIDGE + 'timeout'] == 3.0
     assert parameters[MOVE_BASE + 'DWAPlannerROS/max_vel_x'] == 0.4
     assert parameters[MOVE_BASE + 'DWAPlannerROS/max_vel_theta'] == 1.5
 
