@@ -78,3 +78,31 @@ def test_a_transform_of_the_future_blocks_no_lookup():
                 except tf2_ros.TransformException:
                     missed.append((number, camera))
     assert missed == []
+
+
+@pytest.mark.parametrize('blocked', [('odom',), ('base_link',), ('odom', 'base_link')])
+def test_a_transform_of_the_future_does_not_stop_the_latest_pose(blocked):
+    parents = {'odom': 'map', 'base_link': 'odom'}
+    with masterless() as connections:
+        transforms = Transforms(wait_s=0.0)
+        for number in range(30):
+            stamp = STAMP + rospy.Duration(number * 0.1)
+            links = [link(parent, child, stamp) for child, parent in parents.items()]
+            links[1].transform.translation.x = number
+            if number == 10:
+                later = [link(parents[child], child, stamp + rospy.Duration(3600)) for child in blocked]
+                connections.send('/tf', TFMessage(later))
+            connections.send('/tf', TFMessage(links))
+            if number < 10 or number >= 12:
+                assert transforms.lookup('map', 'base_link', rospy.Time())[0, 3] == number
+
+
+def test_one_late_transform_does_not_replace_the_latest_pose():
+    with masterless() as connections:
+        transforms = Transforms(wait_s=0.0)
+        for seconds in (100, 80):
+            connections.send('/tf', TFMessage([link('map', 'base_link', rospy.Time(seconds))]))
+        connections.send('/tf', TFMessage([link('map', 'front', STAMP)]))
+        assert transforms.lookup('map', 'base_link', rospy.Time(100))[0, 3] == 0
+        transforms.lookup('map', 'base_link', rospy.Time())
+        assert transforms.lookup('map', 'base_link', rospy.Time(100))[0, 3] == 0

@@ -6,6 +6,7 @@ import tf2_ros
 from ros_3d_bb.conversions.perception_msgs import NEWEST, transform_from_msg
 
 CACHE_S = 10.0  # tf2 rejects transforms that are older than the newest one of their frame by more
+REJECTED = 2  # transforms in sequence that tf2 rejects after a jump, and not because one is late; chosen
 MOST_RECENT = 1000  # recent transforms that are kept; chosen: some seconds of /tf of a Jackal, some megabytes
 
 
@@ -21,9 +22,9 @@ class TransformBuffer(tf2_ros.BufferCore):
     """tf2 buffer for `lookup` at the stamps of images.
 
     After a backward jump in time, or one transform with a stamp in the future, tf2 rejects the transforms of a frame.
-    If a lookup at their time fails because of this, the buffer is cleared, except for static transforms, and the recent
-    transforms up to that time are added again. Rejected transforms of other frames, or of another time than that of the
-    lookup, have no effect, as in tf2.
+    If a lookup at their time fails because of this, or the latest transforms are looked up, the buffer is cleared,
+    except for static transforms, and the recent transforms up to that time are added again. Rejected transforms of
+    other frames, or of another time than that of the lookup, have no effect, as in tf2.
     """
 
     def __init__(self):
@@ -33,6 +34,7 @@ class TransformBuffer(tf2_ros.BufferCore):
 
     def _start(self):
         self._newest_s, self._rejected_before_s = {}, {}  # by child frame
+        self._rejected = {}  # number of rejected transforms in sequence, and stamp of the latest one, by child frame
         self._recent = collections.deque(maxlen=MOST_RECENT)  # (transform, authority), also rejected ones
 
     def set_transform(self, transform, authority):
@@ -41,6 +43,9 @@ class TransformBuffer(tf2_ros.BufferCore):
         newest_s = self._newest_s[child] = max(stamp_s, self._newest_s.get(child, stamp_s))
         if stamp_s < newest_s - CACHE_S:
             self._rejected_before_s[child] = newest_s - CACHE_S
+            self._rejected[child] = self._rejected.get(child, (0, 0.0))[0] + 1, stamp_s
+        else:
+            self._rejected.pop(child, None)
         self._recent.append((transform, authority))
         self._parents[child] = transform.header.frame_id.lstrip('/')
         tf2_ros.BufferCore.set_transform(self, transform, authority)
@@ -56,8 +61,11 @@ class TransformBuffer(tf2_ros.BufferCore):
         self._start()
 
     def lookup(self, target_frame, source_frame, stamp):
-        """Look up `target_from_source`, a 4x4 matrix, at a stamp. Raises tf2_ros.TransformException."""
+        """Look up `target_from_source`, a 4x4 matrix, at a stamp, 0 for the latest one. Raises
+        tf2_ros.TransformException."""
         target, source = target_frame.lstrip('/'), source_frame.lstrip('/')
+        if stamp.is_zero():
+            self._forget_later(target, source)
         try:
             return transform_from_msg(self.lookup_transform_core(target, source, stamp))
         except tf2_ros.TransformException:
@@ -81,8 +89,17 @@ class TransformBuffer(tf2_ros.BufferCore):
 
     def _is_blocked(self, target, source, stamp_s):
         """Whether transforms at a stamp were rejected of a frame between two others. A stamp of 0 means the latest."""
-        between = set(path_to_root(self._parents, target)) ^ set(path_to_root(self._parents, source))
-        return any(0 < stamp_s < self._rejected_before_s.get(frame, 0) for frame in between)
+        return any(0 < stamp_s < self._rejected_before_s.get(frame, 0) for frame in self._between(target, source))
+
+    def _forget_later(self, target, source):
+        """Forget what is later than the latest transforms of a frame between two others, if those were rejected."""
+        rejected = [self._rejected[frame] for frame in self._between(target, source) if frame in self._rejected]
+        stamps_s = [stamp_s for count, stamp_s in rejected if count >= REJECTED]
+        if stamps_s:
+            self._clear_after(max(stamps_s) + CACHE_S)
+
+    def _between(self, target, source):
+        return set(path_to_root(self._parents, target)) ^ set(path_to_root(self._parents, source))
 
     def _clear_after(self, stamp_s):
         recent = list(self._recent)  # a copy, as another thread may add transforms
