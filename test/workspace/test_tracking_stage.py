@@ -188,3 +188,12 @@ def test_a_map_in_another_frame_or_without_cells_is_rejected(rig, message, words
 
 def test_cells_are_occupied_from_65_on(rig):
     assert occupied_from_msg(map_in('map')).cells.tolist() == [[True, False], [False, False]]
+
+
+def test_tracks_are_withheld_while_a_camera_is_silent():
+    rig = Rig('front', 'rear', camera_timeout=0.5)
+    assert rig.send(START_NS, 'front') is None
+    assert rig.send(START_NS + NS // 10, 'rear') is not None and rig.send(START_NS + NS // 5, 'front') is not None
+    assert rig.send(START_NS + 7 * NS // 10, 'front') is None
+    assert 'no boxes of rear for 0.5 s' in rig.events.sentences['tracks withheld']
+    assert rig.send(START_NS + 8 * NS // 10, 'rear') is not None

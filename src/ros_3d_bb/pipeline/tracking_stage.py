@@ -53,6 +53,9 @@ class TrackerNodeParams(NamedTuple):
     stamp_tolerance: float = STAMP_TOLERANCE
     classes_file: str = CLASSES_FILE
     tf_timeout: float = Param(0.2, 'How long to wait for the transform at the stamp of the boxes.', 's')
+    camera_timeout: float = Param(
+        0.0, 'With several cameras, no tracks are published while there are no boxes of one of them for this time, so '
+        'that planners stop. 0: those of the other cameras are published.', 's')
     use_map: bool = Param(False, 'Whether no track starts in occupied cells of the static map.', section=SET_BY_LAUNCH)
 
 
@@ -106,6 +109,7 @@ class TrackingStage(object):
         self.lock = threading.RLock()
         self._clocks = CameraClocks()
         self._jumps = 0  # number of backward jumps in time
+        self._boxes_ns = {}  # newest stamp of tracked boxes, by camera
         self._frames, self._usable_frames, self._intrinsics = {}, {}, {}  # by camera
         self._depths = {camera: MessageCache(int(params.depth_cache_length * NS)) for camera in self.cameras}
         self._registrations = {camera: DepthRegistration(transforms, topic_of(camera, DEPTH_TOPICS[RAW][1]))
@@ -205,7 +209,19 @@ class TrackingStage(object):
                               'in %s jumped, as after an error of the odometry; all tracks are moved with them'
                               % (stamp_ns / NS, self._params.target_frame))
         newest_ns = self._clocks.track(stamp_ns, camera)
+        self._boxes_ns[camera] = stamp_ns
+        silent = self._silent_cameras(newest_ns)
+        if silent:
+            self._events.warn('tracks withheld', 'no boxes of %s for %g s (~camera_timeout): no tracks are published, so '
+                              'that planners stop' % (', '.join(silent), self._params.camera_timeout))
+            return
         self._on_tracks(tracks, Header(stamp=time_from(newest_ns), frame_id=self._params.target_frame))
+
+    def _silent_cameras(self, newest_ns):
+        """Names of the cameras whose newest boxes are older than ~camera_timeout."""
+        timeout_s = self._params.camera_timeout or float('inf')
+        return [camera for camera in self.cameras
+                if newest_ns - self._boxes_ns.get(camera, float('-inf')) > timeout_s * NS]
 
     def _view(self, header, fixed_from_camera, camera, camera_name):
         """Return the CameraView of boxes with this header, with intrinsics and depth if they are known."""
