@@ -5,7 +5,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ros_3d_bb.camera.camera_model import transform_from
-from ros_3d_bb.planning.planner_view import footprint_points, in_frame, position_after, predicted_to, usable_tracks
+from ros_3d_bb.planning.planner_view import (covariances_after, footprint_points, in_frame, position_after, predicted_to,
+                                                usable_tracks)
+from ros_3d_bb.tracking.types import OUT_OF_VIEW
+from ros_3d_bb_lab.simulation.simulator import upright
 from support.tracks import track_at
 
 
@@ -95,6 +98,27 @@ def segment_distances(points, start, end):
     along = end - start
     share = np.clip((points - start).dot(along) / max(along.dot(along), 1e-12), 0, 1)
     return np.linalg.norm(points - start - share[:, None] * along, axis=1)
+
+
+def test_before_its_stamp_a_walking_person_is_on_the_way():
+    track = track_at([3, 1, 0.9], [1.0, -0.5, 0], moving=True)
+    np.testing.assert_allclose(position_after(track, -0.4), [2.6, 1.2, 0.9])
+
+
+def test_positions_become_less_certain_beyond_the_predictions():
+    track = track_at([3, 1, 0.9], [0, 0, 0], covariance=0.01 * np.eye(6))
+    track = track._replace(prediction_covariance_m2=(0.01 + 0.02 * np.arange(1, 9))[:, None, None] * np.eye(3))
+    np.testing.assert_allclose(covariances_after(track, np.array([2.0, 3.0]))[:, 0, 0], [0.17, 0.25])
+
+
+@pytest.mark.parametrize('heading', [0.0, np.pi / 4, np.pi / 2])
+def test_what_is_marked_of_a_walking_person_out_of_view_does_not_depend_on_the_heading(heading):
+    turn = upright(0, 0, 0, heading)[:3, :3]
+    covariance = np.zeros((6, 6))
+    covariance[:3, :3] = turn.dot(np.diag([0.23 ** 2, 0.1 ** 2, 0.01])).dot(turn.T)
+    track = track_at([3, 1, 0.9], turn.dot([1, 0, 0]), moving=True, covariance=covariance)
+    track = track._replace(status=OUT_OF_VIEW, prediction_covariance_m2=np.tile(covariance[:3, :3], (8, 1, 1)))
+    assert len(footprint_points([track], 0.3, 0.1)) == 0
 
 
 @given(random_tracks(), st.floats(0, 2))

@@ -59,24 +59,27 @@ def walking_velocity(track):
 def position_after(track, ahead_s):
     """Positions (..., 3) of a track `ahead_s` (...) seconds after its stamp, metres.
 
-    The predicted positions are interpolated linearly. Beyond the last one, only moving tracks move on, at their
-    velocity.
+    The predicted positions are interpolated linearly. Before the stamp and beyond the last one, only moving tracks
+    move, at their velocity.
     """
     ahead_s = np.asarray(ahead_s, float)
     known_m = np.vstack((track.position_m, track.prediction_m))
-    beyond_s = np.maximum(ahead_s - track.prediction_step_s * len(track.prediction_m), 0)
+    beyond_s = np.maximum(ahead_s - track.prediction_step_s * len(track.prediction_m), 0) + np.minimum(ahead_s, 0)
     return (_interpolated(known_m, track.prediction_step_s, ahead_s)
             + beyond_s[..., np.newaxis] * walking_velocity(track))
 
 
 def covariances_after(track, ahead_s):
     """Covariances (n, 3, 3) of the positions of a track `ahead_s` (n,) seconds after its stamp, m², interpolated
-    linearly; 0 if unknown. Beyond the last one they stay the same.
+    linearly; 0 if unknown. Beyond the last one they go on to grow as before it.
     """
     if track.covariance is None or track.prediction_covariance_m2 is None:
         return np.zeros((len(ahead_s), 3, 3))
     known_m2 = np.concatenate((track.covariance[np.newaxis, :3, :3], track.prediction_covariance_m2))
-    return _interpolated(known_m2.reshape(-1, 9), track.prediction_step_s, ahead_s).reshape(-1, 3, 3)
+    beyond = np.maximum(np.asarray(ahead_s) / track.prediction_step_s - len(track.prediction_covariance_m2), 0)
+    growth_m2 = known_m2[-1] - known_m2[-2] if len(known_m2) > 1 else np.zeros((3, 3))
+    return (_interpolated(known_m2.reshape(-1, 9), track.prediction_step_s, ahead_s).reshape(-1, 3, 3)
+            + beyond[:, np.newaxis, np.newaxis] * growth_m2)
 
 
 def _interpolated(rows, step_s, times_s):
@@ -121,7 +124,7 @@ def footprint_points(tracks, ahead_s, spacing_m):
     points = [np.empty((0, 3))]
     for track in tracks:
         covariances_m2 = covariances_after(track, np.append(0, later_s))
-        std_m = np.sqrt(np.maximum(covariances_m2[:, 0, 0], covariances_m2[:, 1, 1]))
+        std_m = np.sqrt(np.maximum(np.linalg.eigvalsh(covariances_m2[:, :2, :2])[:, 1], 0))  # in any direction
         if track.moving and track.status == OUT_OF_VIEW and std_m[0] >= MAX_STD_UNSEEN_M:
             continue
         disc = disc_points(track.size_m[0] / 2, spacing_m)
