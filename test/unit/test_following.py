@@ -50,8 +50,23 @@ def test_a_person_who_is_not_visible_is_lost_after_a_second_and_followed_again_w
 def test_a_track_that_is_missing_for_a_moment_is_kept():
     selector = TargetSelector()
     selected(selector, 1, person(1, 3, 0), person(2, 2, 3))
-    assert selected(selector, 1.3, person(2, 2, 3)) is None
-    assert selected(selector, 1.4, person(1, 3, 0), person(2, 2, 3)) == 1
+    assert selected(selector, 1.9, person(2, 2, 3)) == 1
+    assert selected(selector, 2.1, person(2, 2, 3)) is None
+    assert selected(selector, 2.2, person(1, 3, 0), person(2, 2, 3)) == 1
+
+
+def test_a_track_that_is_missing_moves_as_predicted():
+    selector = TargetSelector()
+    selected(selector, 1, person(1, 3, 0, vx=1.0))
+    missing = selector.select([], int(1.5 * NS), ORIGIN, PARAMS)
+    assert missing.position_m[0] == pytest.approx(3.5) and missing.status == OCCLUDED
+
+
+def test_a_person_from_before_a_jump_of_the_clock_is_not_followed():
+    selector = TargetSelector()
+    selected(selector, 100, person(1, 3, 0))
+    assert selected(selector, 40, person(2, 3, 0, first_s=39)) is None and selector.has_given_up
+    assert selected(selector, 101, person(3, 3, 0, first_s=100.5)) is None
 
 
 @pytest.mark.parametrize('others, followed', [
@@ -168,7 +183,7 @@ def test_the_robot_waits_for_a_person_who_crosses():
 def test_the_robot_decelerates_when_the_person_is_lost():
     drive = Drive(lambda seconds: (2.5 + 0.7 * seconds, 0.0)).run(8)
     here = np.linalg.inv(upright(*drive.pose[:2], z=0, yaw=0))
-    drive.follower.update([], int(8 * NS), here)
+    drive.follower.update([], int((8 + PARAMS.lost_after) * NS), here)
     velocities = [drive.follower.command([], 0.1, here, STEP_S) for _step in range(40)]
     assert velocities[0][0] == pytest.approx(drive.velocities[-1][0] - SAFETY.deceleration * STEP_S)
     assert velocities[-1] == (0.0, 0.0) and drive.follower.person is None

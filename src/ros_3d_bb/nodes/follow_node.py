@@ -1,7 +1,9 @@
 """ROS node that lets a robot follow one person."""
+import math
 import threading
 from typing import NamedTuple
 
+import numpy as np
 import rospy
 from actionlib_msgs.msg import GoalID
 from geometry_msgs.msg import PoseStamped, Twist
@@ -15,10 +17,11 @@ from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.latest_tracks import RobotTracks
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
-from ros_3d_bb.planning.following import Follower, FollowParams, is_new_goal
+from ros_3d_bb.planning.following import NEW_GOAL_M, Follower, FollowParams, is_new_goal
 from ros_3d_bb.planning.safe_speed import SafeSpeedParams
 
 CMD_VEL, GOAL = 'cmd_vel', 'goal'
+RESENT_S = 5.0  # after this time a goal that is not reached is sent again, as move_base may have ended; chosen
 PERIOD_S = 0.05  # between commands; chosen: that of move_base's controller
 
 
@@ -50,7 +53,7 @@ class FollowNode(object):
     cmd_vel : geometry_msgs/Twist
         Velocity of the robot, 20 times per second while it follows; with ~output cmd_vel.
     move_base_simple/goal : geometry_msgs/PoseStamped
-        Where the robot keeps its distance from the person; with ~output goal.
+        Where the robot keeps its distance from the person, every 5 s until it is there; with ~output goal.
     move_base/cancel : actionlib_msgs/GoalID
         Cancels the goal; with ~output goal.
     ~target : std_msgs/UInt32
@@ -65,6 +68,7 @@ class FollowNode(object):
     def __init__(self):
         self._params, follow, safety = given = read_params(FollowNodeParams, FollowParams, SafeSpeedParams)
         self._enabled, self._is_driving, self._goal, self._target = self._params.enabled, False, None, 0
+        self._goal_s = 0.0  # ROS time of the goal
         self._lock, self._diagnostics = threading.Lock(), Diagnostics()
         self._follower = Follower(follow, safety)
         self._velocity_pub = rospy.Publisher('cmd_vel', Twist, queue_size=1)
@@ -120,8 +124,12 @@ class FollowNode(object):
         goal = self._follower.goal(around.age_s, around.robot_from_tracks)
         if goal is None:
             self._stop()
-        elif is_new_goal(self._goal, goal):
-            self._is_driving, self._goal = True, goal
+            return
+        now_s = rospy.get_time()
+        robot_m = np.linalg.inv(around.robot_from_tracks)[:2, 3]
+        is_late = now_s - self._goal_s > RESENT_S and math.hypot(*(robot_m - goal[:2])) > NEW_GOAL_M
+        if is_late or is_new_goal(self._goal, goal):
+            self._is_driving, self._goal, self._goal_s = True, goal, now_s
             header = Header(stamp=time_from(around.stamp_ns), frame_id=around.frame_id)
             self._goal_pub.publish(pose_to_msg(*goal, header=header))
 

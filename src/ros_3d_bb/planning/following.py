@@ -10,10 +10,10 @@ import numpy as np
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.core.labels import PERSON
 from ros_3d_bb.core.params import Param, parameters
-from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.core.time_sync import JUMP_NS, NS
 from ros_3d_bb.planning.planner_view import position_after, predicted_to
 from ros_3d_bb.planning.safe_speed import highest_safe_speed
-from ros_3d_bb.tracking.types import VISIBLE
+from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE
 
 # A lost person is within NEAR_M of the prediction, and TURNING_MPS more for each second, up to FARTHEST_M; chosen.
 NEAR_M, TURNING_MPS, FARTHEST_M = 0.5, 1.0, 2.0
@@ -34,7 +34,7 @@ class FollowParams(NamedTuple):
 
     track_id: int = Param(
         0, 'Track ID of the person to follow; 0: the nearest visible person.', limits=(0, 2 ** 31 - 1),
-        live=(0, 1000))
+        live=(0, 100000))
     distance: float = Param(
         2.0, 'Distance from the axis of the person to the origin of the robot.', 'm', limits=(0.3, 10.0),
         live=(0.5, 4))
@@ -72,13 +72,16 @@ class TargetSelector(object):
         self._path = []  # (track, stamp) of the target in the last PATH_NS
 
     def select(self, tracks, stamp_ns, robot_m, params):
-        """The track of the person among the tracks at a stamp, or None if the person is lost.
+        """The track of the person at a stamp, predicted if it is not among the tracks; None if the person is lost.
 
         `robot_m` (2,) is the position of the robot, `params` are FollowParams.
         """
         if self.target is None:
             self.target = _chosen(tracks, robot_m, params.track_id)
         if self.target is None or self.has_given_up:
+            return None
+        if self.target.id in self._seen and stamp_ns < self._seen[self.target.id][1] - JUMP_NS:
+            self.has_given_up = True  # the clock went back
             return None
         self._seen = {key: entry for key, entry in self._seen.items()
                       if key == self.target.id or stamp_ns - entry[1] <= params.recover_within * NS}
@@ -91,7 +94,10 @@ class TargetSelector(object):
         lost_s = (stamp_ns - self._seen[self.target.id][1]) / NS
         self.target = self._seen[self.target.id][0]
         self.has_given_up = lost_s > params.recover_within
-        return next((track for track in tracks if track.id == self.target.id and lost_s <= params.lost_after), None)
+        if lost_s > params.lost_after:
+            return None
+        predicted, = predicted_to([self.target], lost_s)
+        return next((track for track in tracks if track.id == self.target.id), predicted._replace(status=OCCLUDED))
 
     def _check_identity(self, tracks, stamp_ns):
         """Change to the new track of the person where the tracker has given the old one to a person who crosses: the
@@ -176,6 +182,8 @@ class Follower(object):
         Both are 0 once the robot stands and there is no person to follow.
         """
         wanted = (0.0, 0.0) if self.person is None else self._wanted(age_s, robot_from_tracks)
+        if self.person is not None and all(track.id != self.person.id for track in tracks):
+            tracks = list(tracks) + [self.person]
         limit = highest_safe_speed(tracks, age_s, robot_from_tracks, (max(wanted[0], SLOWEST_MPS), 0.0, wanted[1]),
                                    self._safety)
         params, (linear, angular) = self._params, self._velocity
