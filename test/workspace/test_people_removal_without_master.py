@@ -3,7 +3,7 @@ import contextlib
 
 import numpy as np
 import pytest
-from sensor_msgs.msg import CameraInfo, Image, LaserScan, PointCloud2, PointField
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, LaserScan, PointCloud2, PointField
 from std_msgs.msg import Header
 
 from fuzz.hostile import transforms
@@ -14,6 +14,7 @@ from ros_3d_bb.conversions.range_msgs import cloud_without, points_of_cloud
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.people_removal_node import PeopleRemovalNode
+from support.compressed import compressed_fields
 from support.masterless import masterless, on_the_wire
 from support.planners import person
 from support.ros import camera_info
@@ -22,8 +23,8 @@ STAMP_NS = 1000 * NS
 
 
 @contextlib.contextmanager
-def node_with(inputs, *people, age_ns=NS // 10):
-    with masterless({'inputs': inputs, 'tf_timeout': 0.0}) as connections:
+def node_with(inputs, *people, age_ns=NS // 10, **params):
+    with masterless(dict(params, inputs=inputs, tf_timeout=0.0)) as connections:
         node = PeopleRemovalNode()
         connections.now = time_from(STAMP_NS)
         connections.send('/tf', transforms(STAMP_NS))
@@ -91,6 +92,24 @@ def test_pixels_of_people_become_invalid():
         connections.send('~camera_info', camera_info(STAMP_NS))
         values = imgmsg_to_depth(sent(connections, 'depth', image)).values
     assert (values[20:30, 26:38] == 0).all() and (values[depth_mm == 4000] == 4000).all()
+
+
+def test_the_unit_of_the_depth_can_be_given():
+    depth = fill_image(Image(header=Header(stamp=time_from(STAMP_NS), frame_id='camera')),
+                       np.full((48, 64), 8000, np.uint16), '16UC1')
+    with node_with('depth', walking(2.0, 0.0), depth_scale=0.00025) as connections:
+        connections.send('~camera_info', camera_info(STAMP_NS))
+        assert imgmsg_to_depth(sent(connections, 'depth', depth)).values[24, 32] == 0
+
+
+@pytest.mark.parametrize('people', [(), (walking(2.0, 0.0),)])
+def test_compressed_depth_is_sent_as_an_image(people):
+    depth = fill_image(Image(header=Header(stamp=time_from(STAMP_NS), frame_id='camera')),
+                       np.full((48, 64), 2000, np.uint16), '16UC1')
+    with node_with('depth', *people) as connections:
+        connections.send('~camera_info', camera_info(STAMP_NS))
+        values = imgmsg_to_depth(sent(connections, 'depth', CompressedImage(**compressed_fields(depth, 'compressedDepth png')))).values
+    assert (values[24, 32] == 0) == bool(people) and values[0, 0] == 2000
 
 
 @pytest.mark.parametrize('change, words', [

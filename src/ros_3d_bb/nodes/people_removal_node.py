@@ -7,10 +7,11 @@ import tf2_ros
 from sensor_msgs.msg import CameraInfo, Image, LaserScan, PointCloud2
 
 from ros_3d_bb.camera.camera_model import transform_points
+from ros_3d_bb.conversions.camera_msgs import uncompressed
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
 from ros_3d_bb.conversions.perception_msgs import camera_from_msg, stamp_of
 from ros_3d_bb.conversions.range_msgs import cloud_without, depth_without, points_of_cloud, scan_without
-from ros_3d_bb.core.params import TRACKS_TIMEOUT, Param, parameters
+from ros_3d_bb.core.params import DEPTH_SCALE, TRACKS_TIMEOUT, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.latest_tracks import LatestTracks
@@ -31,6 +32,7 @@ class PeopleRemovalParams(NamedTuple):
     margin: float = Param(
         0.2, 'Measurements up to this distance from the body of a person, in addition to the standard deviation of the '
         'predicted position, are removed.', 'm', limits=(0.0, 2.0))
+    depth_scale: float = DEPTH_SCALE
     tf_timeout: float = Param(0.1, 'How long to wait for the transform at the stamp of the measurements.', 's')
 
 
@@ -88,6 +90,7 @@ class PeopleRemovalNode(object):
     def _on_message(self, name, remover, message):
         with self._diagnostics.receiving(name):
             if self._pubs[name].get_num_connections():
+                message = uncompressed(message) if name == 'depth' else message
                 self._pubs[name].publish(self._without_people(name, remover, message))
 
     def _without_people(self, name, remover, message):
@@ -116,7 +119,7 @@ class PeopleRemovalNode(object):
         return cloud_without(message, are_inside(points_m, cylinders))
 
     def _without_in_depth(self, message, fixed_from_sensor, cylinders):
-        depth = imgmsg_to_depth(message)
+        depth = imgmsg_to_depth(message, self._params.depth_scale, check_unit=True)
         if self._camera is None or depth.shape != (self._camera.height, self._camera.width):
             raise ValueError('there is no camera_info with its size, %d x %d' % depth.shape[::-1])
         return depth_without(message.header, depth, pixels_inside(depth, self._camera, fixed_from_sensor, cylinders))
