@@ -154,10 +154,6 @@ class Graph(object):
         self.waits(lambda: subprocess.call(['xdotool', 'search', '--onlyvisible', '--name', title],
                                            env=self.environment, stdout=subprocess.DEVNULL) == 0, 'window ' + title)
 
-    def says(self, words):
-        """Wait until these words are in the output."""
-        self.waits(lambda: words in self.output(), words)
-
     def waits(self, condition, what):
         """Wait for a condition; fail after PATIENCE_S, or when the first process ends."""
         deadline_s = time.monotonic() + PATIENCE_S
