@@ -4,16 +4,13 @@ import os
 
 import pytest
 import rospy
-from geometry_msgs.msg import Twist
-from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
-from std_msgs.msg import Float32, UInt32
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
-from support.ros import Recorder, publisher, started, wait_until
+from support.ros import Recorder, started, wait_until
 
 RATE = 15
 SCENE = """
@@ -21,12 +18,6 @@ duration: 1.0
 rate: 15.0
 people:
 - {start: [3.0, 0.5], facing: 3.0, moves: [{to: [3.0, -0.5]}]}
-"""
-DRIVING = """
-duration: 8.0
-rate: 10.0
-people:
-- {start: [3.0, 0.0]}
 """
 COLOR = 'camera/color/image_raw'
 TOPICS = {'camera/aligned_depth_to_color/image_raw': Image, 'camera/color/camera_info': CameraInfo,
@@ -40,7 +31,6 @@ def path(tmp_path_factory):
     rospy.init_node('test_simulator_node')
     path = tmp_path_factory.mktemp('scenario') / 'scene.yaml'
     path.write_text(SCENE)
-    (path.parent / 'driving.yaml').write_text(DRIVING)
     return str(path)
 
 
@@ -95,19 +85,3 @@ def test_invalid_parameters_are_rejected_at_the_start(path, params, reason):
     process = started('simulator_node', *params)
     output, _none = process.communicate(timeout=30)
     assert process.returncode == 1 and reason in output and 'Traceback' not in output
-
-
-@pytest.fixture
-def driving(path):
-    """Recorders of the topics of a driving robot, by topic, and a publisher of commands."""
-    kinds = {'odom': Odometry, 'collisions': UInt32, 'clearance': Float32, '/tf': TFMessage}
-    recorders = {topic: Recorder(topic, kind, publisher_expected=False) for topic, kind in kinds.items()}
-    process = started('simulator_node', 'scenario:=' + os.path.join(os.path.dirname(path), 'driving.yaml'),
-                      'publish_clock:=true', 'drive:=true')
-    try:
-        yield recorders, publisher('cmd_vel', Twist), process
-    finally:
-        process.kill()
-        process.wait()
-        for recorder in recorders.values():
-            recorder.__exit__()
