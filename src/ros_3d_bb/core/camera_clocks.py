@@ -4,7 +4,7 @@ from typing import NamedTuple
 from ros_3d_bb.core.time_sync import JUMP_NS, NS
 
 ALIVE_NS = NS  # a camera without images for longer is ignored
-LONGEST_LAG_NS = 3 * NS  # a camera that lags by less than this may have the correct time and a slow detector
+LONGEST_LAG_NS = 4 * NS  # a camera that lags by less than this may have the correct time and a slow detector
 NEVER = float('inf')
 
 
