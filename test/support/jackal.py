@@ -49,6 +49,8 @@ EXCERPTS = {
         <param name="odom_frame_id" value="odom"/><param name="base_frame_id" value="base_link"/>
         <param name="global_frame_id" value="map"/></node></launch>""",
     'jackal_navigation/launch/amcl_demo.launch': SCAN_TOPIC}
+
+
 def unpack(folder):
     """Write the packages of a Jackal, or excerpts of them, into a folder; returns the folder that contains them."""
     if not os.path.exists(ARCHIVE):

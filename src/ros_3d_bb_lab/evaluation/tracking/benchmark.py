@@ -25,6 +25,7 @@ from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING, STANDING
 from ros_3d_bb_lab.evaluation.tracking.run_generator import SECONDS, simulate
 from ros_3d_bb_lab.evaluation.tracking.trajectories import COLUMNS, made_sequences, read_sequences
 
+
 class Contestant(NamedTuple):
     """Tracker to be compared: `make` creates it, and `outputs(make, run)` returns what it publishes on a run."""
 
