@@ -18,7 +18,7 @@ def main(arguments=None):
             print('annotator: note: %s' % note, file=sys.stderr)
         if arguments.export:
             print('%s: %d rows' % (arguments.export, export(
-                document, arguments.export, arguments.estimator or default_estimator(document), arguments.thesis_form)))
+                document, arguments.export, arguments.estimator or default_estimator(document))))
         elif arguments.analyse:
             _analyse(document, arguments)
         else:
@@ -78,7 +78,6 @@ def _arguments(arguments):
     parser.add_argument('--estimator', choices=('foreground', 'median', 'recorded'), help='positions of --analyse and '
                         '--export: new estimates, or the recorded ones (default: foreground; recorded for the old '
                         'format; --export has no median)')
-    parser.add_argument('--thesis-form', action='store_true', help='--export writes the table of the thesis')
     parsed = parser.parse_args(arguments)
     if (parsed.export or parsed.analyse or parsed.validate) and not parsed.session:
         parser.error('a SESSION expected')
@@ -86,6 +85,4 @@ def _arguments(arguments):
         parser.error('--out is for --analyse')
     if parsed.estimator and not (parsed.analyse or parsed.export and parsed.estimator != 'median'):
         parser.error('--estimator is for --analyse, and --export, which has no median')
-    if parsed.thesis_form and not parsed.export:
-        parser.error('--thesis-form is for --export')
     return parsed

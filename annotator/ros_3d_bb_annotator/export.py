@@ -1,7 +1,6 @@
-"""Tables of a session as CSV in millimetres; errors are measured minus true values.
+"""Table of a session as CSV in millimetres, which `./run noise --z --x` reads. It has one row per annotated person.
 
-The table has one row per annotated person. The form of the thesis has integers and columns for X and Z only. Both can
-be read by `./run noise --z --x`.
+Errors are measured minus true values.
 """
 import csv
 import io
@@ -14,8 +13,6 @@ from ros_3d_bb_annotator.measurement import ANNOTATED
 
 RECORDED = 'recorded'
 AXES = 'XYZ'
-THESIS_COLUMNS = ('X measured', 'X true', 'Z measured', 'Z true', 'X error', 'X absolute error', 'Z error',
-                  'Z absolute error')
 COLUMNS = (('id', 'label', 'stamp', 'x1', 'y1', 'x2', 'y2', 'estimator')
            + tuple('%s %s' % (axis, kind) for kind in ('measured', 'recorded', 'true', 'error') for axis in AXES)
            + ('implausible',))
@@ -42,24 +39,18 @@ def rows_of(document, estimator):
                + ('yes' if (index, person) in implausible else '',))
 
 
-def thesis_rows_of(document, estimator):
-    """Rows of THESIS_COLUMNS, ints, sorted by the measured values."""
-    return sorted(_thesis_row(position_m, truth_m)
-                  for _index, _person, position_m, truth_m in _people_of(document, estimator))
-
-
-def export(document, path, estimator, in_thesis_form=False):
-    """Write a table to a CSV file atomically, and return the number of rows.
+def export(document, path, estimator):
+    """Write the table to a CSV file atomically, and return the number of rows.
 
     Raises SessionError if no measurement is annotated, or the file cannot be written.
     """
-    rows = list((thesis_rows_of if in_thesis_form else rows_of)(document, estimator))
+    rows = list(rows_of(document, estimator))
     if not rows:
         raise SessionError('%s: no annotated measurement with an estimate; there is nothing to export'
                            % document.folder)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator='\n')
-    writer.writerow(THESIS_COLUMNS if in_thesis_form else COLUMNS)
+    writer.writerow(COLUMNS)
     writer.writerows(rows)
     try:
         atomic_write(os.path.abspath(path), text.getvalue().encode())
@@ -78,12 +69,6 @@ def _people_of(document, estimator):
         for person, truth_m in sorted(measurement.truths.items()):
             if positions[person] is not None:
                 yield index, person, positions[person], truth_m
-
-
-def _thesis_row(position_m, true_m):
-    (x, z), (true_x, true_z) = ([int(round(1000 * float(values_m[axis]))) for axis in (0, 2)]
-                                for values_m in (position_m, true_m))
-    return x, true_x, z, true_z, x - true_x, abs(x - true_x), z - true_z, abs(z - true_z)
 
 
 def _millimetres(value_m):

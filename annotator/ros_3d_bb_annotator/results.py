@@ -5,8 +5,6 @@ from ros_3d_bb_annotator import dialogs
 from ros_3d_bb_annotator.export import default_estimator, export
 from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets
 
-FORMS = ('CSV, one row per person (*.csv)', 'CSV in the form of the thesis (*.csv)')
-
 
 class Work(QtCore.QThread):
     """Calls `work()` in a thread. Afterwards `result` is its return value, or `error` its exception."""
@@ -34,18 +32,17 @@ class Results(QtCore.QObject):
         return self._work is not None and self._work.isRunning()
 
     def ask_export(self):
-        """Ask for a file and its form, and write the table of errors to it."""
-        path, form = QtWidgets.QFileDialog.getSaveFileName(
-            self._window, 'Export CSV', os.path.join(self._window.document.folder, 'measurements.csv'),
-            ';;'.join(FORMS))
+        """Ask for a file, and write the table of errors to it."""
+        path, _filter = QtWidgets.QFileDialog.getSaveFileName(
+            self._window, 'Export CSV', os.path.join(self._window.document.folder, 'measurements.csv'), '*.csv')
         if path:
-            self.export(path, form == FORMS[1])
+            self.export(path)
 
-    def export(self, path, in_thesis_form=False):
+    def export(self, path):
         """Write the table of errors to a file, or show an error message."""
         document = self._window.document
         try:
-            count = export(document, path, default_estimator(document), in_thesis_form)
+            count = export(document, path, default_estimator(document))
         except (ValueError, OSError) as error:
             dialogs.show_error(self._window, 'The table was not written', error)
             return

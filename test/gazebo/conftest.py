@@ -9,12 +9,10 @@ import subprocess
 import numpy as np
 import pytest
 import rospy
-import tf2_ros
 from gazebo_msgs.msg import ModelStates
 from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import CameraInfo, Image
 
-from ros_3d_bb.conversions.perception_msgs import transform_from_msg
 from ros_3d_bb.msg import TrackedObjectArray
 from support.processes import end, processes_naming
 from support.ros import Recorder, wait_until
@@ -35,8 +33,6 @@ class World(object):
         self.info = Recorder('camera/color/camera_info', CameraInfo, publisher_expected=False)
         self.tracks = Recorder('ros_3d_bb/tracks', TrackedObjectArray, publisher_expected=False)
         self.goal = rospy.Publisher('move_base_simple/goal', PoseStamped, queue_size=1)
-        self.transforms = tf2_ros.Buffer()
-        self._listener = tf2_ros.TransformListener(self.transforms)
 
     def _on_states(self, message):
         """Positions of the people and of the robot, and the yaw of the robot."""
@@ -62,10 +58,6 @@ class World(object):
     def is_at(self, place_m):
         """Whether the robot has arrived at a place (2,)."""
         return np.hypot(*(self.truth[-1][1][ROBOT] - place_m)) < 0.5
-
-    def transform(self, target, source):
-        """Newest transform (4, 4)."""
-        return transform_from_msg(self.transforms.lookup_transform(target, source, rospy.Time(0)))
 
 
 @pytest.fixture(scope='session')

@@ -1,4 +1,4 @@
-"""Camera, tf and tracks of the Jackal among the people of worlds/people.world."""
+"""Camera and tracks of the Jackal among the people of worlds/people.world."""
 import numpy as np
 import pytest
 import rospy
@@ -6,7 +6,6 @@ from gazebo_msgs.msg import ModelState
 from gazebo_msgs.srv import SetModelState
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 
-from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from
 from ros_3d_bb.conversions.perception_msgs import stamp_of
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObject
@@ -34,15 +33,6 @@ def test_images_have_the_frame_size_encoding_and_rate_of_the_robot(people):
     assert set(map(stamp_of, people.color.messages)) & set(map(stamp_of, people.info.messages))
     np.testing.assert_allclose(np.reshape(people.info.messages[-1].K, (3, 3)),
                                [[614.7, 0, 319.5], [0, 614.7, 239.5], [0, 0, 1]], atol=0.1)
-
-
-def test_tf_has_the_frames_of_the_robot_with_the_camera_of_the_thesis(people):
-    people.wait_for(lambda: people.transforms.can_transform('odom', 'base_link', rospy.Time(0)), 'the EKF')
-    assert np.linalg.norm(people.transform('odom', 'base_link')[:2, 3]) < 0.05  # it stands
-    np.testing.assert_allclose(people.transform('base_link', 'camera_color_optical_frame'),
-                               transform_from((0.17, 0, 0.20), OPTICAL_ROTATION), atol=1e-6)
-    frames = people.transforms.all_frames_as_yaml()
-    assert all(name in frames for name in ('chassis_link', 'imu_link', 'front_mount', 'front_left_wheel_link'))
 
 
 def test_each_person_is_tracked_at_the_true_position(people):

@@ -19,7 +19,7 @@ from support.processes import pid_of
 from support.ros import Recorder, launched, wait_until
 
 FOLLOWED_S = float(os.environ.get('ROS_3D_BB_FOLLOW_S', 25))
-STARTING_S, LEADER, SAME_M, STOP_S = 60.0, 1, 0.8, 1.0
+STARTING_S, LEADER, STOP_S = 60.0, 1, 1.0
 SCENE = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', 'config', 'scenarios', 'follow.yaml')
 
 

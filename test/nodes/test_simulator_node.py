@@ -4,16 +4,13 @@ import os
 
 import pytest
 import rospy
-from geometry_msgs.msg import Twist
-from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
-from std_msgs.msg import Float32, UInt32
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
-from support.ros import Recorder, publisher, started, wait_until
+from support.ros import Recorder, started, wait_until
 
 RATE = 15
 SCENE = """
@@ -21,12 +18,6 @@ duration: 1.0
 rate: 15.0
 people:
 - {start: [3.0, 0.5], facing: 3.0, moves: [{to: [3.0, -0.5]}]}
-"""
-DRIVING = """
-duration: 8.0
-rate: 10.0
-people:
-- {start: [3.0, 0.0]}
 """
 COLOR = 'camera/color/image_raw'
 TOPICS = {'camera/aligned_depth_to_color/image_raw': Image, 'camera/color/camera_info': CameraInfo,
@@ -40,7 +31,6 @@ def path(tmp_path_factory):
     rospy.init_node('test_simulator_node')
     path = tmp_path_factory.mktemp('scenario') / 'scene.yaml'
     path.write_text(SCENE)
-    (path.parent / 'driving.yaml').write_text(DRIVING)
     return str(path)
 
 
@@ -75,14 +65,14 @@ def test_all_messages_have_the_stamps_of_the_scene(round_of_scene):
     assert times == sorted(times)
 
 
-def test_time_and_tf_are_published_every_10_ms_and_at_the_images(round_of_scene):
+def test_time_and_tf_are_published_every_20_ms_and_at_the_images(round_of_scene):
     start = round_of_scene['ground_truth'][0].header.stamp
     transforms = [message.transforms for message in round_of_scene['/tf']]
     assert [[link.child_frame_id for link in links] for links in transforms] == [
         ['odom', 'base_link', 'camera_color_optical_frame']] * len(transforms)
     times_ns = [(links[0].header.stamp - start).to_nsec() for links in transforms]
     images_ns = [int(round(number / RATE * NS)) for number in range(RATE)]
-    assert times_ns == sorted(set(range(0, NS + 1, NS // 100)) | set(images_ns))
+    assert times_ns == sorted(set(range(0, NS + 1, NS // 50)) | set(images_ns))
     clock_ns = [(message.clock - start).to_nsec() for message in round_of_scene['/clock']]
     assert clock_ns[-len(times_ns):] == times_ns
 
@@ -95,19 +85,3 @@ def test_invalid_parameters_are_rejected_at_the_start(path, params, reason):
     process = started('simulator_node', *params)
     output, _none = process.communicate(timeout=30)
     assert process.returncode == 1 and reason in output and 'Traceback' not in output
-
-
-@pytest.fixture
-def driving(path):
-    """Recorders of the topics of a driving robot, by topic, and a publisher of commands."""
-    kinds = {'odom': Odometry, 'collisions': UInt32, 'clearance': Float32, '/tf': TFMessage}
-    recorders = {topic: Recorder(topic, kind, publisher_expected=False) for topic, kind in kinds.items()}
-    process = started('simulator_node', 'scenario:=' + os.path.join(os.path.dirname(path), 'driving.yaml'),
-                      'publish_clock:=true', 'drive:=true')
-    try:
-        yield recorders, publisher('cmd_vel', Twist), process
-    finally:
-        process.kill()
-        process.wait()
-        for recorder in recorders.values():
-            recorder.__exit__()

@@ -28,12 +28,6 @@ CAMERA_DRIVER = """
 </node>
 <node pkg="tf2_ros" type="static_transform_publisher" name="$(arg camera)_frames"
       args="0 0 0 -0.5 0.5 -0.5 0.5 $(arg camera)_link $(arg camera)_color_optical_frame"/>"""
-# robot_upstart makes a job of a launch file; the stand-in checks that the file can be loaded.
-UPSTART = """#!/bin/bash
-echo "robot_upstart install $*" >> "$READER_LOG"
-roslaunch --nodes "${1%%/*}" "$(basename "$1")" >> "$READER_LOG"
-"""
-SLIDERS = '#!/bin/bash\necho rqt_reconfigure >> "$READER_LOG"\n'
 
 
 class Reader(object):
@@ -68,19 +62,12 @@ class Reader(object):
         """Packages that a test machine does not have, and the virtual environment that `run` would make."""
         stand_in_gazebo(packages)
         stand_in_launch_file(packages, 'realsense2_camera/launch/rs_camera.launch', RS_CAMERA_ARGUMENTS, CAMERA_DRIVER)
-        for package, program, text in (('robot_upstart', 'install', UPSTART),
-                                       ('rqt_reconfigure', 'rqt_reconfigure', SLIDERS)):
-            write(packages / package / 'package.xml', '<package format="2"><name>%s</name></package>' % package)
-            self._write_program(packages / package / program, text)
-        self._write_program(self.cache / 'venv' / 'bin' / 'python3', '#!/bin/sh\nexec %s "$@"\n' % sys.executable)
+        python = self.cache / 'venv' / 'bin' / 'python3'
+        write(python, '#!/bin/sh\nexec %s "$@"\n' % sys.executable)
+        python.chmod(0o755)
         wanted = b''.join(open(os.path.join(ROOT, 'test', name), 'rb').read()
                           for name in ('requirements.txt', 'requirements_no_deps.txt'))
         (self.cache / 'venv' / 'installed').write_text('%s  -\n' % sha1(wanted).hexdigest())  # the format of sha1sum
-
-    @staticmethod
-    def _write_program(path, text):
-        write(path, text)
-        path.chmod(0o755)
 
     def environment(self, **more):
         """Environment variables of the user, and more."""
@@ -156,20 +143,16 @@ class Graph(object):
     def hears(self, *wanted):
         """Wait for a message on each of these topics ('topic', or 'topic:field that is not empty')."""
         self.waits(self._has_master, 'a master')
-        result = subprocess.run([sys.executable, os.path.join(SUPPORT, 'hearing.py'), str(PATIENCE_S)] + list(wanted),
-                                env=dict(self.environment, PYTHONPATH='%s:%s' % (
-                                    os.path.dirname(SUPPORT), self.environment['PYTHONPATH'])),
-                                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
-        assert result.returncode == 0, result.stdout + self.output()
+        for topic, _colon, field in (each.partition(':') for each in wanted):
+            condition = ['--filter', 'm.' + field] if field else []
+            status = subprocess.call(['timeout', str(PATIENCE_S), 'rostopic', 'echo', '--noarr', '-n', '1', topic]
+                                     + condition, env=self.environment, stdout=subprocess.DEVNULL)
+            assert status == 0, 'nothing on %s\n%s' % (topic, self.output())
 
     def shows(self, title):
         """Wait for a window with this title."""
         self.waits(lambda: subprocess.call(['xdotool', 'search', '--onlyvisible', '--name', title],
                                            env=self.environment, stdout=subprocess.DEVNULL) == 0, 'window ' + title)
-
-    def says(self, words):
-        """Wait until these words are in the output."""
-        self.waits(lambda: words in self.output(), words)
 
     def waits(self, condition, what):
         """Wait for a condition; fail after PATIENCE_S, or when the first process ends."""

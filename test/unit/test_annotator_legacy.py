@@ -5,7 +5,6 @@ import pytest
 
 from ros_3d_bb.sessions.session_reader import SessionError, read_session
 from ros_3d_bb_annotator.document import Document
-from ros_3d_bb_annotator.export import thesis_rows_of
 from ros_3d_bb_annotator.validation import problems_of
 from support.old_session import LINES, write_old_session
 from support.small_session import read_json
@@ -44,7 +43,6 @@ def test_truth_is_saved_in_another_file_and_the_text_is_unchanged(tmp_path):
     reopened = Document.open(str(tmp_path))
     assert reopened.is_old_format and reopened.notes and len(reopened.measurements) == 5
     assert reopened.errors(1)[:2] == pytest.approx((-0.007, 0.0)) and reopened.progress == (2, 5)
-    assert thesis_rows_of(reopened, 'recorded') == [(-7, 0, 300, 300, -7, 7, 0, 0)]
     assert document.undo() == 0 and Document.open(str(tmp_path)).measurements[0].rejected is None
     assert all('depth' not in entry for entry in read_json(tmp_path)['frames'])  # it must not be used as distances
     with pytest.raises(SessionError, match="'camera'"):

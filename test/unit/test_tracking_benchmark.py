@@ -102,7 +102,6 @@ def run_command(monkeypatch, *arguments):
 @pytest.mark.needs('norfair', 'trackeval')
 def test_the_command_writes_settings_and_scores(monkeypatch, tmp_path, capsys):
     monkeypatch.delenv('ROS_3D_BB_DATA', raising=False)
-    monkeypatch.setattr(benchmark, 'PEOPLE', (5,))
     path = tmp_path / 'scores.json'
     run_command(monkeypatch, '--seed', '5', '--seconds', '2', '--repetitions', '1', '--json', str(path))
     result = json.loads(path.read_text())
@@ -110,7 +109,7 @@ def test_the_command_writes_settings_and_scores(monkeypatch, tmp_path, capsys):
     assert set(result['prediction']) == {'made_sparse', 'made_dense', 'mean'}
     assert {'ours', 'thesis', 'library'} <= set(result['trackers'])
     for name, scores in result['trackers'].items():
-        assert KEYS <= set(scores) and scores['cpu_ms']['5'] > 0
+        assert KEYS <= set(scores)
         for key in ('coverage_95_position', 'coverage_95_velocity', 'coverage_95_1s', 'coverage_95_2s'):
             assert (scores[key] is None) == (name != 'ours')
     assert 'made_dense_driving' in capsys.readouterr().out

@@ -1,12 +1,12 @@
-"""Each kind of invalid message is rejected with a reason or used in part, and the next valid one is processed at once.
+"""An invalid message is rejected with a reason or used in part, and the next valid one is processed at once.
 
-Real nodes, without a master. test/fuzz mixes the same faults at random.
+Real nodes, without a master. test/fuzz mixes more faults at random; test_perception_msgs.py and test_image_msgs.py list
+the reasons.
 """
 import contextlib
 from unittest import mock
 
 import genpy
-import numpy as np
 import pytest
 from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import Header
@@ -46,59 +46,37 @@ def stamped(stamp_ns):
     return fields(header=Header(stamp=time_from(stamp_ns), frame_id='camera'))
 
 
-def nan_and_inf(message):
-    """A depth image in metres, of which few pixels are measured."""
-    depth_m = np.full((message.height, message.width), np.nan, np.float32)
-    depth_m[::2], depth_m[8:44:2, 26:38], depth_m[::5] = 4.0, 2.0, np.inf
-    message.encoding, message.step, message.data = '32FC1', 4 * message.width, depth_m.tobytes()
-
-
 def damaged_compressed(message):
     """A compressed image in place of the message."""
     return CompressedImage(message.header, '16UC1; compressedDepth', bytes(100))
 
 
-EXTREMES = [-2 ** 31, -2 ** 31, 2 ** 31 - 1, 2 ** 31 - 1]
 OTHER_STAMPS = [(stamped(START_NS + HOUR_NS), None), (stamped(START_NS - 900 * NS), None)]
 IMAGES = OTHER_STAMPS + [
-    (fields(step=1), 'image data is too short'), (fields(data=bytes(100)), 'image data is too short: 100 bytes'),
-    (fields(width=0, height=0, step=0, data=b''), 'image is empty: 0 x 0 pixels'),
-    (fields(encoding='9UC7'), "has encoding '9UC7'; expected one of"),
+    (fields(step=1), 'image data is too short'),
     (damaged_compressed, "sensor_msgs/CompressedImage of format '16UC1; compressedDepth' cannot be decoded"),
     (fields(header__stamp=genpy.Time()), 'has no stamp (zero)'),
     (fields(header__stamp=time_from(START_NS + HOUR_NS)), None),
     (fields(header__stamp=time_from(START_NS - 900 * NS)), None)]
-CAMERAS = OTHER_STAMPS + [
-    (fields(K=[0.0] * 9), 'it is empty'), (fields(K__0=0.0), 'fx=0 fy=60'), (fields(K__4=float('nan')), 'fy=nan'),
-    (fields(width=0, height=0), 'camera size 0 x 0 is not positive'), (stamped(0), None),
-    (fields(distortion_model='ftheta', D=[0.9]), "distortion model is 'ftheta'")]
+CAMERAS = OTHER_STAMPS + [(fields(K=[0.0] * 9), 'it is empty'), (stamped(0), None)]
 BOXES2D = [
     (fields(data=[26, 8, 38]), '3 numbers; a multiple of 4 expected'),
     (fields(data=[38, 44, 26, 8]), '(38, 44, 26, 8) is empty or reversed'),
-    (fields(data=[26, 8, 26, 8]), 'is empty or reversed'),
-    (fields(data=[10] * 10 ** 6), '250000 2D boxes in one image; at most 1000 expected'),
-    (fields(data=[]), None), (fields(data=[200, 200, 300, 300]), None), (fields(data=EXTREMES), None),
-    (label('boxes;stamp=x'), "2D boxes have the label 'boxes;stamp=x'"),
+    (fields(data=[-2 ** 31, -2 ** 31, 2 ** 31 - 1, 2 ** 31 - 1]), None),
     (label('boxes;stamp=0.000000000;frame=camera'), 'no depth image with their stamp 0.000'),
-    (label('boxes;stamp=5.000000000;frame=camera'), 'no depth image with their stamp 5.000'),
     (label('boxes;stamp=4600.000000000;frame=camera'), None)]  # they wait for their image, for ~cache_length
 BOXES3D = [
     (fields(boxes__0__center__position__z=float('nan')), 'has centre (0, 0, nan)'),
-    (fields(boxes__0__center__position__z=1e30), 'has centre (0, 0, 1e+30)'),
-    (fields(boxes__0__size__x=-1.0), 'and size (-1, 1.7)'),
-    (fields(boxes__0__position_covariance=[-1.0] * 9), 'positive semi-definite matrix'),
-    (fields(boxes__0__position_covariance=[float('nan')] * 9), 'positive semi-definite matrix'),
-    (fields(boxes__0__center__orientation__w=2.0), None),  # a cylinder's orientation is not read
     (fields(header__stamp=genpy.Time()), 'has no stamp (zero)'),
     (fields(header__stamp=time_from(START_NS + HOUR_NS)), 'no transform from camera to map at 4600.000'),
     (fields(header__stamp=time_from(START_NS - 900 * NS)), 'no transform from camera to map at 100.000'),
-    (fields(header__frame_id=''), 'no transform'), (fields(header__frame_id='nowhere'), 'no transform from nowhere')]
+    (fields(header__frame_id='nowhere'), 'no transform from nowhere')]
 RGBD_NODES = 'bbox3d_node', 'depth_detector_node', 'tracker_node', 'viewer_node'
 INPUTS = [('bbox3d_node', BOXES_TOPIC, BOXES2D), ('tracker_node', BOXES3D_TOPIC, BOXES3D),
           ('viewer_node', BOXES3D_TOPIC, OTHER_STAMPS + BOXES3D[:1]),
           ('bbox3d_node', INFO_TOPIC, [(fields(width=32, height=24), 'aligned'), (fields(K__0=90.0), None)]),
           ('depth_detector_node', INFO_TOPIC, [(fields(width=32, height=24), 'aligned')])]
-INPUTS += [(node, DEPTH_TOPIC, IMAGES + [(nan_and_inf, None)]) for node in RGBD_NODES]
+INPUTS += [(node, DEPTH_TOPIC, IMAGES) for node in RGBD_NODES]
 INPUTS += [(node, INFO_TOPIC, CAMERAS) for node in RGBD_NODES]
 INPUTS += [(node, COLOR_TOPIC, IMAGES) for node in ('yolov5_node', 'depth_detector_node', 'viewer_node')]
 CASES = [(node, topic) + case for node, topic, cases in INPUTS for case in cases]

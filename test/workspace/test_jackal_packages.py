@@ -1,6 +1,7 @@
 """Names and sizes in the packages of a Jackal are those that launch files and parameters use, and the description of
 a Jackal takes the camera.
 """
+import functools
 import os
 import xml.etree.ElementTree as ElementTree
 
@@ -10,13 +11,11 @@ import roslaunch
 import yaml
 
 from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams
-from support.jackal import ACCESSORIES, bounds_of_links, described, properties, unpack
+from support.jackal import described, properties, unpack
 from support.launching import ROOT, loaded
 from support.urdf import base_from
 
-CAMERAS = {name: os.path.join(ROOT, 'urdf', name) for name in ('jackal_d435i.urdf.xacro', 'd435i.urdf.xacro')}
-DRIVER_FRAMES = ('link', 'color_frame', 'color_optical_frame', 'depth_frame', 'depth_optical_frame',
-                 'aligned_depth_to_color_frame')
+CAMERA = os.path.join(ROOT, 'urdf', 'jackal_d435i.urdf.xacro')
 
 
 @pytest.fixture(scope='module')
@@ -28,9 +27,7 @@ def packages(tmp_path_factory):
 @pytest.fixture(scope='module')
 def jackal(packages):
     """Description of a Jackal with the camera, as a function of environment variables."""
-    def with_camera(camera='jackal_d435i.urdf.xacro', **variables):
-        return described(packages, JACKAL_URDF_EXTRAS=CAMERAS[camera], **variables)
-    return with_camera
+    return functools.partial(described, packages, JACKAL_URDF_EXTRAS=CAMERA)
 
 
 @pytest.fixture(scope='module')
@@ -115,49 +112,16 @@ def footprint_of(parameters):
     return corners[0] + parameters['/move_base/local_costmap/footprint_padding']
 
 
-def test_footprint_contains_chassis_wheels_and_fenders_only(packages, content, jackal):
+def test_footprint_contains_chassis_and_wheels(packages, content):
     half = footprint_of(loaded('navigation.launch')[0])
     chassis = np.abs(content('jackal_navigation/params/costmap_common_params.yaml')['footprint'])
     size = properties(packages)
     wheels = size['wheelbase'] / 2 + size['wheel_radius'], (size['track'] + size['wheel_width']) / 2
-    fender = np.abs(bounds_of_links(jackal(), packages)['front_fender_link'])[:, :2]
-    for part in (chassis, wheels, fender):
-        assert (np.asarray(part) <= half).all()
-    # doc/planners.md gives the footprint for this accessory.
-    bumper = bounds_of_links(jackal(JACKAL_WIBOTIC_BUMPER='1'), packages)['wibotic_bumper']
-    assert half[0] < bumper[1][0] < 0.33
+    assert (chassis <= half).all() and (wheels <= half).all()
 
 
 def test_the_floor_is_where_the_wheels_touch_it(packages):
     assert abs(DepthDetectorParams().floor_height - properties(packages)['footprint_vertical_offset']) < 1e-3
-
-
-@pytest.mark.parametrize('camera', sorted(CAMERAS))
-@pytest.mark.parametrize('variable, link', [row[:2] for row in ACCESSORIES])
-def test_links_of_accessories_and_frames_of_cameras_differ(jackal, camera, variable, link):
-    description = jackal(camera, **{variable: '1'})
-    links = [link.get('name') for link in description.findall('link')]
-    assert link in links and len(set(links)) == len(links) and 'camera_link' in links
-    if camera == 'jackal_d435i.urdf.xacro':  # without the frames that the driver publishes
-        links.remove('camera_link')
-        names = {'%s_%s' % (camera, frame) for camera in ('camera', 'front', 'rear') for frame in DRIVER_FRAMES}
-        assert not names & set(links)
-
-
-@pytest.mark.parametrize('variables, expected', [
-    ({}, set()),
-    ({'JACKAL_LASER': '1'}, {'front_laser_mount'}),
-    ({'JACKAL_ARK_ENCLOSURE': '1'}, {'ark_enclosure_link'}),
-    ({'JACKAL_LASER': '1', 'JACKAL_D435I_OFFSET': '0.22 0 0.20'}, set())])
-def test_accessories_in_the_place_of_the_camera(packages, jackal, variables, expected):
-    """doc/jackal.md lists them, with a position that is free."""
-    description = jackal(**variables)
-    body = description.find("link[@name='camera_link']/collision")
-    centre = base_from('camera_link', description)[:3, 3] + numbers(body.find('origin').get('xyz'))
-    half = numbers(body.find('geometry/box').get('size')) / 2
-    found = {link for link, (low, high) in bounds_of_links(description, packages).items()
-             if ((low < centre + half) & (centre - half < high)).all()}
-    assert found == expected
 
 
 def numbers(text):

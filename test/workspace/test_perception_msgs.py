@@ -21,7 +21,6 @@ from support.masterless import on_the_wire
 
 INT32 = st.integers(-2 ** 31, 2 ** 31 - 1)
 STAMP = st.integers(1, 2 ** 32 * NS - 1)
-UNCUT = (False,) * 4
 
 
 def header(stamp_ns, frame_id='camera'):

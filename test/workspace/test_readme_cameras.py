@@ -32,7 +32,6 @@ PEOPLE = [{'start': [2.5, 0.5], 'facing': 3.0}, {'start': [3.6, -1.3], 'facing':
 OPTICAL = transform_from((0, 0, 0), OPTICAL_ROTATION)
 EYE = np.eye(4)
 PIPELINE = 'roslaunch ros_3d_bb pipeline.launch weights:=$HOME/yolov5n.pt '
-AZURE_LENS = 'rational_polynomial', (0.46, -2.44, 0.0007, -0.0002, 1.40, 0.34, -2.27, 1.33)
 
 
 def shifted(x_m=0.0, y_m=0.0, z_m=0.0):
@@ -92,12 +91,9 @@ DRIVERS = {
          ('camera_color_frame', 'camera_color_optical_frame', OPTICAL)), depth_late=0.2, tf_topic=TF_TOPIC),
     'azure': Driver(
         'camera_image:=/rgb', ('/rgb/image_raw', '/rgb/camera_info', '/depth_to_rgb/image_raw'),
-        Camera(1280, 720, 612.9, 612.7, 635.4, 367.9, *AZURE_LENS), 'bgra8', '16UC1',
+        Camera(1280, 720, 612.9, 612.7, 635.4, 367.9, 'rational_polynomial',
+               (0.46, -2.44, 0.0007, -0.0002, 1.40, 0.34, -2.27, 1.33)), 'bgra8', '16UC1',
         (('camera_base', 'rgb_camera_link', shifted(y_m=-0.032).dot(OPTICAL)),), depth_late=0.01, border=0.12),
-    'azure, old version': Driver(
-        'camera_image:=/rgb', ('/rgb/image_raw', '/rgb/camera_info', '/depth_to_rgb/image_raw'),
-        Camera(1280, 720, 612.9, 612.7, 635.4, 367.9, *AZURE_LENS), 'bgra8', '32FC1',
-        (('camera_base', 'rgb_camera_link', shifted(y_m=-0.032).dot(OPTICAL)),), rate_hz=5.0, border=0.12),
     'kinect2': Driver(
         'camera_image:=/kinect2',
         ('/kinect2/qhd/image_color_rect', '/kinect2/qhd/camera_info', '/kinect2/qhd/image_depth_rect'),

@@ -45,7 +45,6 @@ LIVE = [claimed('rosrun dynamic_reconfigure dynparam set /tracker_node ' + begin
 MOUNT = claimed('rosrun tf2_ros static_transform_publisher')
 ON_NOETIC = claimed('sudo apt install ros-noetic-ros-base')
 DESK = claimed('source ~/catkin_ws/devel/setup.bash\nroslaunch ros_3d_bb pipeline.launch')
-SLIDERS = claimed('rosrun rqt_reconfigure')
 
 
 @pytest.mark.parametrize('beginning', sorted(LOADED))
@@ -84,7 +83,7 @@ def test_commands_beside_the_pipeline(reader, camera_bag, tmp_path):
         assert re.match(r'\d+\n---\n$', reader.types(PLANNER_POINTS, **master))
         assert 'values' in reader.types(DIAGNOSTICS, **master)
         check_printer(graph, tmp_path / 'printer.py')
-        for block in LIVE + [SLIDERS]:
+        for block in LIVE:
             reader.types(block, **master)
         printed = subprocess.check_output(['rosparam', 'get', '/tracker_node'], env=graph.environment)
         check_mount(reader, master)

@@ -5,7 +5,6 @@ always corrected in this way if there are enough positions. Recorded estimates a
 are skipped.
 """
 import argparse
-import os
 from typing import Any, NamedTuple, Optional
 
 import numpy as np
@@ -15,11 +14,8 @@ from ros_3d_bb.estimation.box3d import plausible, truncated_edges
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.estimation.error_model import read_error_model, write_error_model
 from ros_3d_bb.sessions.session_reader import annotated_people, read_color, read_depth, read_session
-from ros_3d_bb_lab.evaluation.defaults import data_folder, default_weights, scenario_path, write_json
+from ros_3d_bb_lab.evaluation.defaults import data_folder, default_weights, write_json
 from ros_3d_bb_lab.evaluation.error_model_fit import coverage, data_of, fit_error_model, held_out
-from ros_3d_bb_lab.evaluation.scenes import position_errors_m
-from ros_3d_bb_lab.simulation.scenario import read_scenario
-from ros_3d_bb_lab.simulation.simulator import Simulator
 
 LENGTHS = ('rmse_x_m', 'rmse_z_m', 'rmse_plane_m', 'p95_plane_m', 'bias_x_m', 'bias_z_m', 'repeatability_x_m',
            'repeatability_z_m', 'rmse_x_truncated_m')
@@ -152,25 +148,9 @@ def table(result):
     return lines
 
 
-def scenario_scores(path, estimator, every=5):
-    """Errors of both estimators, uncorrected, on a simulated scene with exact boxes and truth, as a dictionary."""
-    simulator, scores = Simulator(read_scenario(path)), {'scenario': os.path.basename(path)}
-    for name, one in (('ours', estimator), ('thesis', estimator_named('median'))):
-        errors_m = position_errors_m(simulator, one, every)
-        found_m = errors_m[~np.isnan(errors_m)]
-        scores[name] = {'boxes': len(errors_m), 'missed': len(errors_m) - len(found_m)}
-        if len(found_m):
-            scores[name].update(rmse_plane_m=float(np.sqrt(np.mean(found_m ** 2))), worst_m=float(found_m.max()),
-                                p95_plane_m=float(np.percentile(found_m, 95)))
-    return scores
-
-
 def main():
     """Run the command `./run bench accuracy`."""
     arguments = _arguments()
-    if arguments.scenarios:
-        _bench_scenarios(arguments)
-        return
     session = read_session(arguments.data)
     session = session._replace(frames=tuple(annotated_people(session.frames)))
     if not session.frames:
@@ -192,23 +172,10 @@ def main():
     print('\n'.join(table(result)))
 
 
-def _bench_scenarios(arguments):
-    """Print the errors on simulated scenes, and optionally write them as JSON."""
-    results = []
-    for path in arguments.scenarios:
-        results.append(scenario_scores(path, estimator_named(arguments.estimator)))
-        print(results[-1]['scenario'])
-        for name in ('ours', 'thesis'):
-            print('  %-7s %s' % (name, '  '.join('%s %.4g' % pair for pair in sorted(results[-1][name].items()))))
-    write_json(arguments.json, {'estimator': arguments.estimator, 'scenarios': results})
-
-
 def _arguments():
     parser = argparse.ArgumentParser(prog='./run bench accuracy', description=__doc__)
     parser.add_argument('--data', default=data_folder('thesis'), metavar='DIR',
                         help='a measurement session (default: $ROS_3D_BB_DATA/data/thesis)')
-    parser.add_argument('--scenarios', nargs='+', type=scenario_path, metavar='SCENARIO',
-                        help='simulated scenes instead of a session')
     parser.add_argument('--error-model', metavar='FILE', help='error model for the correction (default: models fitted '
                         'to the other positions)')
     parser.add_argument('--fit', metavar='FILE', help='also write an error model fitted to all frames')
@@ -219,7 +186,7 @@ def _arguments():
     for name in ('source', 'camera', 'date'):
         parser.add_argument('--' + name, default='', help='stored in the file of --fit')
     arguments = parser.parse_args()
-    if not arguments.data and not arguments.scenarios:
+    if not arguments.data:
         parser.error('no --data given, and ROS_3D_BB_DATA is not set')
     if arguments.boxes == 'yolov5' and not arguments.weights:
         parser.error('--boxes yolov5 needs --weights')

@@ -129,10 +129,9 @@ def main():
     """Run the command `./run bench scenes`."""
     arguments = _parser().parse_args()
     yolov5, results = yolov5_detector(arguments.weights) if arguments.weights else None, []
-    error_model = read_error_model(arguments.error_model) if arguments.error_model else None
     print(COLUMNS % HEADINGS)
     for path in arguments.scenarios:
-        results += _run(path, yolov5, error_model, arguments.every)
+        results += _run(path, yolov5)
     write_json(arguments.json, {'scenes': results})
 
 
@@ -142,22 +141,17 @@ def _parser():
                         default=scenario_paths('thesis_*', 'approach_*'),
                         help='names in config/scenarios or files (default: thesis_*, approach_*)')
     parser.add_argument('--weights', help='checkpoint or export of YOLOv5; without it, YOLOv5 is not run')
-    parser.add_argument('--error-model', default=SIMULATED_ERROR_MODEL, metavar='FILE',
-                        help='error model for the boxes of the detector `exact` (default: that of simulation.launch)')
-    parser.add_argument('--every', type=int, metavar='N',
-                        help='use one image of N (default: %s)' % ', '.join('%s %d' % item for item in EVERY.items()))
     parser.add_argument('--json', metavar='FILE', help='also write the scores to FILE')
     return parser
 
 
-def _run(path, yolov5, error_model, every):
+def _run(path, yolov5):
     """Run one scene with each detector and print the results. The error model applies only to the boxes of `exact`."""
     name, simulator, results = os.path.basename(path).replace('.yaml', ''), Simulator(read_scenario(path)), []
-    every = EVERY if every is None else dict.fromkeys(EVERY, every)
     for detector, detect, model in (('depth', depth_detector(simulator), None), ('yolov5', yolov5, None),
-                                    ('exact', exact_detector(simulator), error_model)):
+                                    ('exact', exact_detector(simulator), read_error_model(SIMULATED_ERROR_MODEL))):
         if detect is not None:
-            steps = run_scene(simulator, detect, every[detector], error_model=model)
+            steps = run_scene(simulator, detect, EVERY[detector], error_model=model)
             results.append(dict(result_of(steps, detector, simulator.camera), scene=name))
             _print_row(results[-1])
     return results

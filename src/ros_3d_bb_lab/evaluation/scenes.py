@@ -18,7 +18,6 @@ from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import CameraView, detections_from_boxes
 from ros_3d_bb_lab.evaluation.clear_mot import Moment
 from ros_3d_bb_lab.simulation.simulator import SimulatedFrame
-from ros_3d_bb_lab.simulation.true_boxes import LEAST_SHOWN
 
 FOUND_IOU = 0.5  # minimum IoU of a true positive
 
@@ -70,26 +69,6 @@ def detections_in(depth, detected, camera, map_from_camera, error_model):
     found = corrected_boxes([box._replace(score=score) for box, score in zip(estimated, detected.scores[usable])
                              if plausible(box)], error_model)
     return detections_from_boxes(dict(enumerate(found)), map_from_camera)
-
-
-def position_errors_m(simulator, estimator, every=1, nearest_m=1.0, farthest_m=6.0):
-    """Position errors in the plane, in metres, of an estimator with exact boxes, for people in a range of depth.
-
-    Only people with at least `LEAST_SHOWN` of the body visible are evaluated. Returns an array (n,), NaN for people
-    without an estimate.
-    """
-    errors_m = []
-    for number in range(0, simulator.frame_count, every):
-        frame = simulator.frame(number)
-        people = [person for person in frame.people if person.visible >= LEAST_SHOWN]
-        boxes = estimate_boxes(DepthImage(frame.depth_mm, 0.001), [person.box_px for person in people],
-                               simulator.camera, estimator)
-        camera_from_map = np.linalg.inv(frame.poses.map_from_camera)
-        for person, box in zip(people, boxes):
-            x_m, _y, z_m = transform_points(camera_from_map, person.position_m)
-            if nearest_m <= z_m <= farthest_m:
-                errors_m.append(np.hypot(box.center_m[0] - x_m, box.center_m[2] - z_m) if plausible(box) else np.nan)
-    return np.array(errors_m)
 
 
 def score_detections(steps, nearest_m, farthest_m, least_visible=0.8):

@@ -19,7 +19,7 @@ from ros_3d_bb_lab.evaluation.tracking.metrics import PAIRED_M
 BAND_M, LEAST_IN_BAND = 4.0, 20  # bands of range, and images of people that one needs, for the detection probability
 DETECTED = 0.8  # share of the people in a band up to which the range of the detector extends
 MOST_DETECTED = 0.99
-LONGEST_LAG_S, LAGS = 1.5, 15
+LONGEST_LAG_S = 1.5
 TIMES_S = np.geomspace(0.02, 5.0, 49)  # candidates for the correlation time
 LEAST_PAIRS = 100  # of errors at two times, for the correlation time
 

@@ -4,8 +4,6 @@ Detection errors are as measured in the thesis. Without recordings, pedestrian t
 """
 import argparse
 import functools
-import math
-import time
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,23 +16,14 @@ from ros_3d_bb_lab.evaluation.baselines.norfair_baseline import LIDAR, LIDAR_SCO
 from ros_3d_bb_lab.evaluation.baselines.oracle_association import outputs_with_perfect_association
 from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker, as_it_arrived
 from ros_3d_bb_lab.evaluation.defaults import data_folder, write_json
-from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel
-from ros_3d_bb_lab.evaluation.tracking.detection_generator import SimulatedDetection
 from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
 from ros_3d_bb_lab.evaluation.tracking.prediction_benchmark import predictions
 from ros_3d_bb_lab.evaluation.tracking.rates_benchmark import (PEDESTRIANS_EVERY, RECORDINGS_EVERY, Part,
                                                                scores_by_rate, with_sources)
 from ros_3d_bb_lab.evaluation.tracking.recorded_detections import read_recordings, with_error_model
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING, STANDING
-from ros_3d_bb_lab.evaluation.tracking.run_generator import SECONDS, detection_of, simulate, view_of
+from ros_3d_bb_lab.evaluation.tracking.run_generator import SECONDS, simulate
 from ros_3d_bb_lab.evaluation.tracking.trajectories import COLUMNS, made_sequences, read_sequences
-
-# CPU time: people walk in circles around fixed places, on an area that grows with their number
-PEOPLE = (5, 20, 100)
-AREA_M2 = 1.0  # per person
-CIRCLE_M, TURNS_HZ = 0.3, 0.3
-WARM_UP, MEASURED, RATE_HZ = 15, 45, 30
-SIZE_M = (0.5, 1.7)
 
 
 class Contestant(NamedTuple):
@@ -57,22 +46,17 @@ CONTESTANTS = (Contestant('ours', Tracker, outputs_of),
                Contestant('thesis_mended', ThesisTracker, outputs_of), Contestant('library', Norfair, outputs_of))
 
 
-def _outputs_of_likely(make_tracker, run):
-    """As `outputs_of`, for trackers that do not use scores: without the boxes below the score tuned for Norfair."""
+def _norfair_outputs(make_tracker, run):
+    """As `outputs_of`, for Norfair at the rate of the run, without the boxes below the score tuned for it."""
+    period_s = np.median(np.diff([image.stamp_ns for image in run.images])) / NS
     images = [image._replace(detections=[detection for detection in image.detections
                                          if detection.score >= LIDAR_SCORE]) for image in run.images]
-    return outputs_of(make_tracker, run._replace(images=tuple(images)))
+    return outputs_of(lambda: make_tracker(LIDAR._replace(rate_hz=1 / period_s)),
+                      run._replace(images=tuple(images)))
 
 
-def _norfair_outputs(make_tracker, run):
-    """As `_outputs_of_likely`, for Norfair at the rate of the run."""
-    period_s = np.median(np.diff([image.stamp_ns for image in run.images])) / NS
-    return _outputs_of_likely(lambda: make_tracker(LIDAR._replace(rate_hz=1 / period_s)), run)
-
-
-CONTESTANTS_ON_DETECTIONS = (
-    Contestant('ours', Tracker, outputs_of), Contestant('thesis', OriginalTracker, _outputs_of_likely),
-    Contestant('thesis_mended', ThesisTracker, _outputs_of_likely), Contestant('library', Norfair, _norfair_outputs))
+CONTESTANTS_ON_DETECTIONS = (Contestant('ours', Tracker, outputs_of),
+                             Contestant('library', Norfair, _norfair_outputs))
 BOUND = Contestant('perfect_association', Tracker, outputs_with_perfect_association)
 
 
@@ -85,7 +69,7 @@ def runs_of(sequences, seed, repetitions, seconds=SECONDS):
 
 
 def compare(runs, contestants):
-    """Score each tracker on all runs, and print its HOTA on each. Returns {name: scores}, without `cpu_ms`.
+    """Score each tracker on all runs, and print its HOTA on each. Returns {name: scores}.
 
     Raises ValueError if an optional library is not installed.
     """
@@ -96,36 +80,6 @@ def compare(runs, contestants):
         print('  %-24s %4d images, HOTA %s' % (run.name, len(run.images), ', '.join(
             '%s %.1f' % (name, scores_of(run_scores[-1:])['hota']) for name, run_scores in scores.items())), flush=True)
     return {name: scores_of(run_scores) for name, run_scores in scores.items()}
-
-
-def cpu_ms(make_tracker, people):
-    """Median CPU time of an update in milliseconds, with `people` people that are detected in every image."""
-    tracker, spent_s = make_tracker(), []
-    for stamp_ns, detections, view in crowd(people, WARM_UP + MEASURED):
-        begin_s = time.process_time()
-        tracker.update(stamp_ns, detections, view)
-        spent_s.append(time.process_time() - begin_s)
-    return 1e3 * float(np.median(spent_s[WARM_UP:]))
-
-
-def crowd(people, images):
-    """Yield images (stamp_ns, detections, view) of a crowd in the field of view."""
-    random, camera = np.random.RandomState(people), CameraModel()
-    view = view_of(np.zeros(3), camera)
-    farthest_m = np.sqrt(2 * people * AREA_M2 / camera.field_of_view + 1)
-    range_m = np.sqrt(random.uniform(1, farthest_m ** 2, people))
-    bearing = random.uniform(-0.45, 0.45, people) * camera.field_of_view
-    phase = random.uniform(0, 2 * np.pi, people)
-    for number in range(images):
-        angle = phase + 2 * np.pi * TURNS_HZ * number / RATE_HZ
-        depth_m = range_m * np.cos(bearing) + CIRCLE_M * np.cos(angle)
-        left_m = range_m * np.sin(bearing) + CIRCLE_M * np.sin(angle)
-        depth_m += random.normal(size=people) * camera.depth_sigma_m(depth_m)
-        left_m += random.normal(size=people) * camera.side_floor_m
-        found = [SimulatedDetection(np.arctan2(left_m[row], depth_m[row]), depth_m[row], SIZE_M[0], SIZE_M[1], False,
-                                    row)
-                 for row in range(people)]
-        yield (number + 1) * NS // RATE_HZ, [detection_of(box, view, camera) for box in found], view
 
 
 def table(trackers):
@@ -139,9 +93,6 @@ def table(trackers):
             values = [scores['coverage_95_by_range'][band][name] for scores in trackers.values()]
             lines.append('%-22s' % ('coverage_95 %s m, %s' % (band, name))
                          + ''.join('%20s' % _text('coverage_95', value) for value in values))
-    for people in list(trackers.values())[0].get('cpu_ms', ()):
-        times = ''.join('%20.2f' % scores['cpu_ms'][people] for scores in trackers.values())
-        lines.append('%-22s' % ('cpu_ms, %s people' % people) + times)
     return lines
 
 
@@ -174,8 +125,6 @@ def bench(arguments):
     contestants = CONTESTANTS + ((BOUND,) if arguments.bound else ())
     runs = runs_of(sequences, arguments.seed, arguments.repetitions, arguments.seconds)
     trackers = compare(runs, contestants)
-    for contestant in contestants:
-        trackers[contestant.name]['cpu_ms'] = {str(people): cpu_ms(contestant.make, people) for people in PEOPLE}
     print('\n'.join(table(trackers)))
     prediction = predictions(sequences)
     print('\n'.join(prediction_table(prediction)))
@@ -186,8 +135,7 @@ def bench(arguments):
 
 def _bench_detections(arguments):
     """Run the comparison on recorded detections, as `bench`."""
-    runs = list(read_recordings(arguments.detections, arguments.every, arguments.min_score,
-                                not arguments.no_odometry))
+    runs = list(read_recordings(arguments.detections, arguments.every, not arguments.no_odometry))
     contestants = CONTESTANTS_ON_DETECTIONS
     if arguments.error_model:
         model = read_error_model(arguments.error_model)
@@ -207,7 +155,7 @@ def _bench_rates(arguments):
     runs = list(runs_of(sequences, arguments.seed, arguments.repetitions, arguments.seconds))
     parts = [Part('pedestrians', runs, PEDESTRIANS_EVERY)]
     if arguments.detections:
-        recordings = read_recordings(arguments.detections, 1, arguments.min_score, not arguments.no_odometry)
+        recordings = read_recordings(arguments.detections, 1, not arguments.no_odometry)
         parts.append(Part('recorded_detections', [with_sources(run) for run in recordings], RECORDINGS_EVERY))
     return {part.name: scores_by_rate(part, (CONTESTANTS[0], BOUND)) for part in parts}
 
@@ -228,8 +176,6 @@ def _arguments():
     parser.add_argument('--rates', action='store_true', help='compare our tracker with perfect data association by '
                         'image rate instead: the pedestrians, and the recordings of --detections if it is given')
     parser.add_argument('--every', type=int, default=1, metavar='N', help='of --detections: use each N-th image')
-    parser.add_argument('--min-score', type=float, default=-math.inf, metavar='S',
-                        help='of --detections: leave out boxes with lower scores (default: none)')
     parser.add_argument('--no-odometry', action='store_true',
                         help='of --detections: track in the frame of the camera, as without a pose of the robot')
     parser.add_argument('--error-model', metavar='FILE', help='of --detections: correct the boxes by an error model '

@@ -45,7 +45,7 @@ def score_run(run, outputs):
 
 
 def scores_of(run_scores):
-    """Combine the scores of all runs, from `score_run`, to a dictionary, without `cpu_ms`.
+    """Combine the scores of all runs, from `score_run`, to a dictionary.
 
     Scores are in percent, lengths in metres, and coverage is a share 0..1. Values without data are None.
     """

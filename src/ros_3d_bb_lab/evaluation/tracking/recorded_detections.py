@@ -76,11 +76,11 @@ def _corrected(detections, fixed_from_camera, model):
     return corrected
 
 
-def read_recordings(folder, every=1, min_score=-np.inf, with_odometry=True):
+def read_recordings(folder, every=1, with_odometry=True):
     """Yield the runs of the recordings in the subfolders of a folder, or of a folder that is itself a recording.
 
-    `every` uses each n-th image, `min_score` leaves out boxes with lower scores, in the unit of the file. Without
-    odometry, the camera is assumed to stand still: the fixed frame moves with it, and so does the truth.
+    `every` uses each n-th image. Without odometry, the camera is assumed to stand still: the fixed frame moves with it,
+    and so does the truth.
 
     Raises ValueError if there is no recording, or a table has missing columns or invalid values; the message names the
     file.
@@ -90,10 +90,10 @@ def read_recordings(folder, every=1, min_score=-np.inf, with_odometry=True):
         raise ValueError('%s has no recording; folders with camera.json, %s expected'
                          % (folder, ', '.join('%s.csv' % name for name in sorted(TABLES))))
     for path in [os.path.join(folder, name) for name in names] or [folder]:
-        yield _read_recording(path, every, min_score, with_odometry)
+        yield _read_recording(path, every, with_odometry)
 
 
-def _read_recording(folder, every, min_score, with_odometry):
+def _read_recording(folder, every, with_odometry):
     camera = _camera(os.path.join(folder, 'camera.json'))
     tables = {name: _table(os.path.join(folder, name + '.csv'), columns.split(',')) for name, columns in TABLES.items()}
     detections, poses = tables['detections'], tables['poses']
@@ -106,8 +106,8 @@ def _read_recording(folder, every, min_score, with_odometry):
     used_from = {stamp: np.eye(4) if with_odometry else still.dot(np.linalg.inv(pose))
                  for stamp, pose in cameras.items()}  # from the fixed frame to that of the tracker
     are_logits = any(not 0 <= box['score'] <= 1 for box in detections)
-    found = _by_stamp([box for box in detections if box['score'] >= min_score])
-    people, ignored = _People(tables['truth'], used_from), _by_stamp(tables['ignored'])
+    found, ignored = _by_stamp(detections), _by_stamp(tables['ignored'])
+    people = _People(tables['truth'], used_from)
     images, unscored = [], {}
     for stamp in stamps[::every]:
         view = CameraView(seen_from[stamp], camera, 'camera')

@@ -1,3 +1,0 @@
-from support.planner_definitions import package
-
-globals().update(vars(package('people_msgs')))
