@@ -1,4 +1,5 @@
 """Annotator on the command line: export, analysis and validation without a window, Qt and ROS."""
+import json
 import os
 
 import pytest
@@ -24,7 +25,9 @@ def test_the_output_folder_and_the_estimator_of_the_analysis_can_be_chosen(tmp_p
     assert main(['--analyse', session, '--out', out, '--estimator', 'recorded']) == 0
     text = capsys.readouterr().out
     assert 'f(z) = ' in text and 'report: %s' % os.path.join(out, 'report.html') in text
-    assert {'report.html', 'error_model.yaml', 'z_error.png'} <= set(os.listdir(out))
+    assert {'report.html', 'summary.json', 'error_model.yaml', 'z_error.png'} <= set(os.listdir(out))
+    with open(os.path.join(out, 'summary.json')) as stream:
+        assert len(json.load(stream)['z']['clusters']) == 6
     assert read_error_model(os.path.join(out, 'error_model.yaml')).provenance.estimator == 'recorded'
 
 

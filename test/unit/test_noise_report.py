@@ -5,6 +5,7 @@ deviations.
 """
 import base64
 import datetime
+import json
 import os
 import re
 import sys
@@ -46,12 +47,14 @@ def out(tmp_path_factory):
 
 
 def test_the_numbers_are_those_of_the_thesis(out):
-    model = read_error_model(out / 'error_model_thesis_form.yaml')
-    assert [round(value, digits) for value, digits in zip(model.z_bias, (2, 2, 3))] == [-0.04, 0.06, 0.008]
-    assert [round(value, 3) for value in model.x_bias] == [-0.106, 0, -0.006]
-    assert '%.5f %.4f' % (model.z_sigma.constant_m ** 2, model.z_sigma.constant_m) == '0.00225 0.0474'
-    assert '%.5f %.3f' % (model.x_sigma.constant_m ** 2, model.x_sigma.constant_m) == '0.00032 0.018'
-    assert model.provenance.measurements in (345, len(rows_of())) and model.provenance.positions in (7, 10)
+    summary = json.loads((out / 'summary.json').read_text())
+    assert [round(value, digits) for value, digits in zip(summary['z']['poly'], (2, 2, 3))] == [-0.04, 0.06, 0.008]
+    assert [round(value, 3) for value in summary['x']['poly']] == [-0.106, -0.006]
+    assert '%.5f %.4f' % (summary['z']['max_variance_m2'], summary['z']['max_sigma_m']) == '0.00225 0.0474'
+    assert '%.5f %.3f' % (summary['x']['max_variance_m2'], summary['x']['max_sigma_m']) == '0.00032 0.018'
+    assert len(summary['z']['clusters']) in (7, 10) and len(summary['x']['variance_clusters']) == 5
+    assert sum(cluster['count'] for cluster in summary['z']['clusters']) in (345, len(rows_of()))
+    assert set(summary['z']['clusters'][0]) >= {'truth_m', 'count', 'mean_m', 'variance_m2', 'shapiro_p', 'anderson'}
 
 
 def test_the_report_contains_all_figures(out):
@@ -104,7 +107,9 @@ def test_what_was_left_out_is_listed_and_does_not_prevent_the_analysis(tmp_path,
     errors = capsys.readouterr().err.splitlines()
     assert [line.split(': ')[1] for line in errors] == ['frame-000', 'frame-004 (A1)']
     assert 'Z 160 mm is implausible' in errors[0] and 'Z 1600 mm would be plausible' in errors[0]
+    summary = json.loads((tmp_path / 'out' / 'summary.json').read_text())
+    assert [outlier['name'] for outlier in summary['outliers']] == ['frame-000', 'frame-004 (A1)']
+    assert dict(map(tuple, summary['left_out'])).keys() == {'frame-001', 'frame-002', 'frame-003', 'frame-005'}
     page = (tmp_path / 'out' / 'report.html').read_text(encoding='utf-8')
     assert 'rejected: not on the mark' in page and 'no ground truth' in page and 'Z 160 mm' in page
-    assert [number for number in range(8) if 'frame-%03d' % number in page] == list(range(6))
-    assert read_error_model(tmp_path / 'out' / 'error_model_thesis_form.yaml').z_sigma.constant_m < 0.05
+    assert summary['z']['max_sigma_m'] < 0.05

@@ -84,6 +84,23 @@ def analyse(inputs):
                     share_between_positions(inputs.x_variance, 'X'), thesis_form, model, reason, origin['date'])
 
 
+def summary_of(analysis):
+    """Summary of the analysis as a dictionary, as stored in summary.json. Lengths are in metres."""
+    x, variance = _axis_summary(analysis.x), _axis_summary(analysis.x_variance)
+    x.update(max_variance_m2=variance['max_variance_m2'], max_sigma_m=variance['max_sigma_m'],
+             variance_clusters=variance['clusters'])
+    scores = None if analysis.model is None else dict(analysis.model.cross_validated._asdict())
+    outliers = [{'name': outlier.name, 'measured_m': outlier.measured_m.tolist(), 'truth_m': outlier.truth_m.tolist()}
+                for outlier in analysis.inputs.outliers]
+    return {'z': _axis_summary(analysis.z), 'x': x, 'cross_validated': scores, 'outliers': outliers,
+            'left_out': [list(pair) for pair in analysis.inputs.z.left_out]}
+
+
+def _axis_summary(axis):
+    return {'poly': list(axis.poly), 'max_variance_m2': axis.max_variance_m2, 'max_sigma_m': axis.max_sigma_m,
+            'clusters': [dict(cluster._asdict()) for cluster in axis.clusters]}
+
+
 def _or_reason(function, *arguments, **origin):
     """Call a function. Returns (result, '') or, if it raises ValueError, (None, message)."""
     try:

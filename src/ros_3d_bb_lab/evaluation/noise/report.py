@@ -1,10 +1,12 @@
-"""Output of the noise analysis: a folder with a report, its figures and error models, and a short text."""
+"""Output of the noise analysis: a folder with a report, its figures, a summary and error models, and a short text."""
+import json
 
 import numpy as np
 
 from ros_3d_bb.estimation.error_model import write_error_model
 from ros_3d_bb.sessions.plausibility import position_text
 from ros_3d_bb_lab.evaluation.html_report import html_report
+from ros_3d_bb_lab.evaluation.noise.analysis import summary_of
 from ros_3d_bb_lab.evaluation.noise.figures import polynomial_text, write_figures
 from ros_3d_bb_lab.evaluation.noise.statistics import LEAST_TO_TEST
 from ros_3d_bb_lab.evaluation.noise.tables import LEAST_IN_CLUSTER, small_clusters
@@ -16,7 +18,7 @@ ESTIMATORS = {'foreground': 'foreground (that of bbox3d_node)', 'median': 'media
 
 
 def write_results(folder, analysis):
-    """Write the report as HTML, its figures and the error models into a folder (pathlib.Path).
+    """Write the report as HTML, its figures, summary.json and the error models into a folder (pathlib.Path).
 
     The folder is created if it does not exist. Raises OSError.
     """
@@ -27,6 +29,7 @@ def write_results(folder, analysis):
     blocks = list(numbered(block._replace(caption=captions[block.name]) if isinstance(block, Figure) else block
                            for block in blocks if not isinstance(block, Figure) or block.name in captions))
     (folder / 'report.html').write_text(html_report(TITLE, blocks, folder), encoding='utf-8')
+    (folder / 'summary.json').write_text(json.dumps(summary_of(analysis), indent=1), encoding='utf-8')
     for name, model in (('error_model_thesis_form.yaml', analysis.thesis_form),
                         ('error_model.yaml', analysis.model or analysis.thesis_form)):
         if model is not None:
