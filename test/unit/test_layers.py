@@ -75,7 +75,7 @@ ALLOWED = {
         'bags conversions core tracking lab.evaluation lab.simulation', 'rosbag tf2_msgs'),
     'ros_3d_bb_lab.evaluation.latency': (
         'bags conversions core msg nodes.common lab.evaluation',
-        'rospy sensor_msgs std_msgs visualization_msgs'),
+        'rosgraph roslib rospy sensor_msgs std_msgs visualization_msgs'),
 }
 QT = {'PyQt5', 'python_qt_binding'}
 

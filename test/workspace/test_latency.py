@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from ros_3d_bb.bags.bag_writer import write_bag
+from ros_3d_bb_lab.evaluation.latency.rospy_limit import topics_of
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from support.processes import processes_naming
@@ -42,8 +43,8 @@ def benchmark(tmp_path):
 
 def test_results_are_written_and_no_process_remains(bag, benchmark, tmp_path):
     results = str(tmp_path / 'latency.json')
-    process = benchmark('--bag', bag, '--cases', 'free', '--seconds', '5', '--rate', '10', '--separate', '--json',
-                        results)
+    process = benchmark('--bag', bag, '--cases', 'free', '--seconds', '5', '--rate', '10', '--separate', '--limits',
+                        '--json', results)
     printed, _nothing = process.communicate()
     assert process.returncode == 0, printed
     with open(results) as stream:
@@ -53,4 +54,16 @@ def test_results_are_written_and_no_process_remains(bag, benchmark, tmp_path):
     assert (case['name'], case['detector'], case['load']) == ('free', 'free', 'none')
     assert case['output_hz'] > 0 and 0 < case['p50_ms'] <= case['p95_ms'] <= case['p99_ms']
     assert NODES <= set(case['cpu_percent']) & set(case['rss_mb']) & set(case['trend']['rss_mb_per_minute'])
+    assert set(case['nodes']) == {'bbox3d_node', 'tracker_node'}
+    for node, found in case['nodes'].items():
+        assert found['cpu_percent'] == case['cpu_percent'][node] and found['limit_percent'] > 0
+        assert found['times_limit'] == pytest.approx(found['cpu_percent'] / found['limit_percent'])
     assert processes_naming(str(tmp_path)) == 0
+
+
+def test_the_topics_of_a_limit_are_those_of_the_node():
+    published = [['/tracks', ['/tracker']], ['/rosout', ['/tracker']], ['/diagnostics', ['/tracker', '/other']],
+                 ['/tracker/parameter_updates', ['/tracker']], ['/boxes', ['/other']]]
+    subscribed = [['/boxes', ['/tracker']], ['/tf', ['/tracker', '/other']], ['/clock', ['/tracker']],
+                  ['/tracks', ['/other', '/rviz']]]
+    assert topics_of('/tracker', (published, subscribed, [])) == ({'/boxes': 0, '/tf': 1}, {'/tracks': 2})

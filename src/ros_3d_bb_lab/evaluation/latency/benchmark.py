@@ -10,13 +10,13 @@ import tempfile
 from typing import NamedTuple
 
 from ros_3d_bb_lab.evaluation.defaults import default_weights, describe_machine, scenario_path, write_json
-from ros_3d_bb_lab.evaluation.latency.latency_result import result_of
+from ros_3d_bb_lab.evaluation.latency.latency_result import LIMIT, SUBSCRIBING, result_of
 from ros_3d_bb_lab.evaluation.launching import launch
 
 IMAGES = 60  # first images of the scene, played forwards and backwards: 2 s, 90 MB
 BUSY_LOOP = 'import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n    pass'
 # Nodes of the benchmark, which do not run on a robot.
-HARNESS = 'replay_node', 'latency_probe_node', 'rosout'
+HARNESS = 'replay_node', 'latency_probe_node', 'rosout', 'limit_audience'
 COLUMNS = '%-16s %6s %6s %8s %8s %8s %8s %9s %9s %9s %7s'
 TITLES = ('case', 'in Hz', 'out Hz', 'p50 ms', 'p95 ms', 'p99 ms', 'dropped', 'CPU %', 'camera %', 'memory MB', 'load')
 
@@ -49,7 +49,8 @@ def measured(case, arguments, bag, folder):
     record, log = (os.path.join(folder, case.name + suffix) for suffix in ('.json', '.log'))
     options = {'bag': bag, 'record': record, 'detector': case.detector, 'weights': case.weights,
                'image_size': case.image_size, 'seconds': arguments.seconds, 'rate': arguments.rate,
-               'single_process': not arguments.separate}
+               'single_process': not arguments.separate,
+               'limits': arguments.limits, 'warm_up': 8.0 if arguments.limits else 3.0}
     with cpu_load(int(case.loaded)), open(log, 'w') as stream:
         launch('latency.launch', options, arguments.seconds + 200, stream)
     try:
@@ -76,7 +77,8 @@ def cpu_load(cores):
 
 def row(result):
     """Format a result as a line of the table."""
-    nodes = [node for node in result['cpu_percent'] if node not in HARNESS]
+    nodes = [node for node in result['cpu_percent']
+             if node not in HARNESS and not node.endswith((LIMIT, SUBSCRIBING))]
     times = ['-' if result[key] is None else '%.1f' % result[key] for key in ('p50_ms', 'p95_ms', 'p99_ms')]
     return COLUMNS % ((result['name'], '%.1f' % result['input_hz'], '%.1f' % result['output_hz']) + tuple(times) + (
         result['dropped'], '%.1f' % sum(result['cpu_percent'][node] for node in nodes),
@@ -87,8 +89,9 @@ def row(result):
 def details(result):
     """Format the results by node and by stage, and the trend, as text."""
     trend, grew = result['trend'], result['trend']['rss_mb_per_minute']
+    compared = {node: ', %.2f times its limit' % found['times_limit'] for node, found in result['nodes'].items()}
     lines = ['  %-31s %5.1f %% of a core, %4.0f MB, %+.2f MB a minute'
-             % (node, result['cpu_percent'][node], result['rss_mb'][node], grew[node])
+             % (node, result['cpu_percent'][node], result['rss_mb'][node], grew[node]) + compared.get(node, '')
              for node in sorted(result['cpu_percent'])]
     stages = ['%s %s' % (stage, '-' if value is None else '%.1f' % value)
               for stage, value in result['stages_ms'].items()]
@@ -132,9 +135,14 @@ def _arguments():
     images.add_argument('--scenario', type=scenario_path, default='demo', metavar='SCENARIO',
                         help='scenario; its first %d images are played (default: demo)' % IMAGES)
     images.add_argument('--bag', help='bag written by scenario_to_bag or session_to_bag with --boxes')
+    parser.add_argument('--limits', action='store_true',
+                        help='also give the CPU usage of each node as a multiple of its limit: that of a bare rospy '
+                        'node that runs beside it, receives the same messages and publishes messages of the same size')
     parser.add_argument('--separate', action='store_true', help='run each node in a process of its own')
     parser.add_argument('--json', metavar='FILE', help='also write the results to this file')
     arguments = parser.parse_args()
+    if arguments.limits and not arguments.separate:
+        parser.error('--limits compares single nodes; expected together with --separate')
     if not (arguments.seconds > 0 and arguments.rate > 0):
         parser.error('--seconds %g, --rate %g: more than 0 expected' % (arguments.seconds, arguments.rate))
     known = {case.name: case for case in cases_of([os.path.abspath(path) for path in arguments.weights])}
