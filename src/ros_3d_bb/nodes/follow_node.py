@@ -1,9 +1,7 @@
 """ROS node that lets a robot follow one person."""
-import math
 import threading
 from typing import NamedTuple
 
-import numpy as np
 import rospy
 from actionlib_msgs.msg import GoalID
 from geometry_msgs.msg import PoseStamped, Twist
@@ -17,7 +15,7 @@ from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.latest_tracks import RobotTracks
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
-from ros_3d_bb.planning.following import NEW_GOAL_M, Follower, FollowParams, is_new_goal
+from ros_3d_bb.planning.following import Follower, FollowParams, is_new_goal, is_reached
 from ros_3d_bb.planning.safe_speed import SafeSpeedParams
 
 CMD_VEL, GOAL = 'cmd_vel', 'goal'
@@ -126,8 +124,7 @@ class FollowNode(object):
             self._stop()
             return
         now_s = rospy.get_time()
-        robot_m = np.linalg.inv(around.robot_from_tracks)[:2, 3]
-        is_late = now_s - self._goal_s > RESENT_S and math.hypot(*(robot_m - goal[:2])) > NEW_GOAL_M
+        is_late = now_s - self._goal_s > RESENT_S and not is_reached(goal, around.robot_from_tracks)
         if is_late or is_new_goal(self._goal, goal):
             self._is_driving, self._goal, self._goal_s = True, goal, now_s
             header = Header(stamp=time_from(around.stamp_ns), frame_id=around.frame_id)

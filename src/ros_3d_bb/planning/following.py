@@ -225,3 +225,8 @@ def is_new_goal(before, goal):
     """Whether a goal (x, y, yaw) differs enough from the one before, which may be None, to be sent."""
     return before is None or (math.hypot(goal[0] - before[0], goal[1] - before[1]) > NEW_GOAL_M
                               or math.cos(goal[2] - before[2]) < math.cos(NEW_GOAL_RAD))
+
+
+def is_reached(goal, robot_from_tracks):
+    """Whether the robot is at the position of a goal (x, y, yaw); `robot_from_tracks` (4, 4) is its pose."""
+    return np.linalg.norm(np.linalg.inv(robot_from_tracks)[:2, 3] - goal[:2]) <= NEW_GOAL_M
