@@ -27,8 +27,8 @@ FILLED = 0.4  # minimum share of both sides of a rectangle that background behin
 
 def estimate_foreground(depth, rects_px, geometry, kinds):
     """Estimate a box from the depth layer of the object in each rectangle of an image: the nearest layer that is
-    dominant near the middle of the rectangle. Furniture in front of a person is lower than people are, and does not reach
-    the upper edge: what does is the person.
+    dominant near the middle of the rectangle. Furniture in front of a person is lower than people are, and does not
+    reach the upper edge: what does is the person.
 
     Background beside and between the limbs may fill most of a rectangle, but it is farther away. Around a person it
     fills the outline of the rectangle, too, as furniture and other people at the sides do. Flying pixels are too sparse
