@@ -183,14 +183,31 @@ def test_a_person_behind_a_table_below_a_tilted_camera_in_a_loose_box(ahead_m, w
         assert plane_errors_m([(frame.people[0], box, camera_from_map)])[0] < 0.3
 
 
-@pytest.mark.parametrize('start_m,facing,height_m,chest_at_m,chest_m,behind_m', [
-    ([4.261, 0.354], 2.1, 1.75, [3.768, 0.155], [0.3, 0.292, 0.763], 1.2),
-    ([4.261, 0.354], 1.4, 1.75, [3.768, 0.155], [0.3, 0.292, 0.763], 1.2)])
-def test_a_person_who_crouches_behind_a_chest(start_m, facing, height_m, chest_at_m, chest_m, behind_m):
+CHEST_M = [0.3, 0.292, 0.763]
+
+
+@pytest.mark.parametrize('camera_m,start_m,facing,height_m,chest_at_m,chest_m,behind_m', [
+    (0.9, [4.261, 0.354], 2.1, 1.75, [3.768, 0.155], CHEST_M, 1.2),
+    (0.9, [4.261, 0.354], 1.4, 1.75, [3.768, 0.155], CHEST_M, 1.2),
+    (0.9, [3.259, 0.536], 2.14, 1.2, [2.38, 0.262], [0.3, 0.372, 0.579], 2.5),
+    (0.27, [3.883, -0.006], 2.05, 1.9, [3.272, -0.055], [0.3, 0.272, 0.949], 2.5),
+    (0.9, [4.394, -0.561], 2.57, 1.9, [3.801, -0.686], [0.3, 0.579, 0.885], 0.7)])
+def test_a_person_who_crouches_behind_a_chest(camera_m, start_m, facing, height_m, chest_at_m, chest_m, behind_m):
     person = {'start': start_m, 'facing': facing, 'height': height_m, 'crouch': 0.7}
-    simulator = simulator_of([person], 0.9, furniture=[{'at': chest_at_m, 'size': chest_m}],
+    simulator = simulator_of([person], camera_m, furniture=[{'at': chest_at_m, 'size': chest_m}],
                              wall_m=start_m[0] + behind_m)
     box, = level_boxes(simulator, [simulator.frame(0).people[0].box_px])
+    assert box.center_m[2] == pytest.approx(depths_m(simulator)[0], abs=0.3)
+
+
+@pytest.mark.parametrize('height_m', [0.27, 0.9])
+@pytest.mark.parametrize('crouch', [0, 0.7])
+def test_a_person_before_a_pillar_in_a_loose_box(height_m, crouch):
+    simulator = simulator_of([{'start': [3.0, 0.1], 'facing': 2.6, 'height': 1.75, 'crouch': crouch}], height_m,
+                             furniture=[{'at': [4.0, 0.1], 'size': [0.25, 0.3, 2.4]}], wall_m=5.0)
+    left, top, right, bottom = simulator.frame(0).people[0].box_px
+    more_px = (bottom - top) // 6
+    box, = level_boxes(simulator, [(left - more_px, top - more_px, right + more_px, bottom)])
     assert box.center_m[2] == pytest.approx(depths_m(simulator)[0], abs=0.3)
 
 

@@ -5,6 +5,7 @@ millimetres in arrays of 16 bits, `UNKNOWN_MM` without depth, without a viewing 
 position among the sorted distances, nearest first.
 """
 import functools
+import math
 from bisect import bisect_right
 from typing import NamedTuple
 
@@ -20,6 +21,10 @@ GRID_ROWS, GRID_COLUMNS = 48, 32
 UPPER_SHARE, LOWER_WEIGHT = 0.55, 0.35
 NEAREST_LAYER_M = 0.001  # nearer distances are 0 in whole millimetres
 UNKNOWN_MM, FARTHEST_LAYER_M = 65535, 65.0  # chosen: 16 bits hold the farthest layer and half a body behind it
+# An object of at least this share of its usual height reaches into the upper part of its rectangle, this share of the
+# rows: it has more than so many samples there. Chosen: a hidden chair appears to have 0.6 of its size, and rectangles
+# of detectors are hardly larger at the top.
+LEAST_SIZE, UPPER_PART, MOST_ABOVE = 0.65, 0.15, 4
 # Half the depth extents of a person with stretched arms, and of the trunk. Chosen: points farther from the trunk are
 # not part of the person, and a wall close behind must not shift the median.
 BODY_HALF_DEPTH_MM, TRUNK_HALF_DEPTH_MM = 350, 250
@@ -74,12 +79,13 @@ class RectSamples(object):
     """Samples of the visible part of a rectangle in the level frame, each an element of flat arrays.
 
     `rays` are the `camera_rays`; `surrounded` states whether the left, the upper and the right edge show what surrounds
-    the object. `shape` are the numbers of rows and columns, and `measured` is the number of samples with depth and a
-    viewing ray, masked or not.
+    the object, and `least_m` is the least height of an object that reaches the upper part of the rectangle if no nearer
+    one hides it (0: unknown). `shape` are the numbers of rows and columns, and `measured` is the number of samples with
+    depth and a viewing ray, masked or not.
     """
 
-    def __init__(self, depth, rect_px, rays, level_axes, surrounded):
-        self.rect_px, self._level_axes = rect_px, level_axes
+    def __init__(self, depth, rect_px, rays, level_axes, surrounded, least_m=0.0):
+        self.rect_px, self._level_axes, self._least_m = rect_px, level_axes, least_m
         self._rows, self._columns = grid_in(rect_px, depth.shape)
         x, y = rays
         x = x[:, self._columns] if len(x) == 1 else x[self._rows, self._columns]
@@ -101,7 +107,32 @@ class RectSamples(object):
         return ((to_x * x + (to_y * y + to_z)) * self._depth_m).ravel()
 
     def _layer_in(self, ahead_mm):
-        return nearest_dominant_layer(ahead_mm, self._weights, self._outline)
+        layer = nearest_dominant_layer(ahead_mm, self._weights, self._outline)
+        return layer and (self._least_m and self._layer_above(ahead_mm, layer) or layer)
+
+    def _layer_above(self, ahead_mm, layer):
+        """The Layer of the object of which a lower one with the given Layer hides a part; None if there is none.
+
+        The lower object is too small, and does not reach into the upper part of the rectangle. What is above it and
+        fills the middle more than the sides is not the background.
+        """
+        rows, columns = self.shape
+        numbers = _around(ahead_mm, layer.trunk_mm, TRUNK_HALF_DEPTH_MM).nonzero()[0]
+        above = int(numbers[min(MOST_ABOVE, len(numbers) - 1)]) // columns
+        if above < UPPER_PART * rows or np.ptp(self._along(1)[numbers]) > self._least_m:
+            return None
+        end = above * columns
+        above_mm, weights = ahead_mm[:end], self._weights[:end]
+        behind = nearest_dominant_layer(above_mm, weights, self._outline[self._outline < end])
+        is_masked = 2 * np.count_nonzero(above_mm < UNKNOWN_MM) < end  # as a part of the lower object may be
+        if is_masked or behind.trunk_mm < layer.trunk_mm + BODY_HALF_DEPTH_MM:
+            return None
+        on_behind = _around(ahead_mm, behind.trunk_mm, BODY_HALF_DEPTH_MM)
+        beside = np.count_nonzero(on_behind[:end].reshape(above, columns)[:, ::max(columns - 1, 1)])
+        share = weights.dot(on_behind[:end]) / weights.sum()
+        if share * 2 * above < beside + OUTLINE_SIGMAS * math.sqrt(beside + 1):
+            return None
+        return nearest_dominant_layer(np.where(on_behind, ahead_mm, np.uint16(UNKNOWN_MM)), self._weights)
 
     def layer(self):
         """Nearest dominant Layer of the samples that are not masked; None if there are none."""
@@ -127,8 +158,7 @@ class RectSamples(object):
 
     def on_body(self, layer):
         """Which samples are on the body of a Layer."""
-        nearest_mm = max(layer.trunk_mm - BODY_HALF_DEPTH_MM, 0)
-        return self._ahead_mm - np.uint16(nearest_mm) <= layer.trunk_mm + BODY_HALF_DEPTH_MM - nearest_mm
+        return _around(self._ahead_mm, layer.trunk_mm, BODY_HALF_DEPTH_MM)
 
     def share(self, on_body):
         """Share of the weight of all samples, with depth or not, that the given samples have."""
@@ -223,6 +253,12 @@ def _outline(shape, surrounded):
     numbers = np.arange(shape[0] * shape[1]).reshape(shape)
     all_edges = numbers[:, :1].ravel(), numbers[:1].ravel(), numbers[:, -1:].ravel()
     return np.concatenate([edge for edge, is_shown in zip(all_edges, surrounded) if is_shown] or [np.arange(0)])
+
+
+def _around(distances_mm, middle_mm, half_mm):
+    """Which distances (n,) are at most `half_mm` from `middle_mm`."""
+    nearest_mm = max(middle_mm - half_mm, 0)
+    return distances_mm - np.uint16(nearest_mm) <= middle_mm + half_mm - nearest_mm
 
 
 def nearest_dominant_layer(distances_mm, weights, outline=()):

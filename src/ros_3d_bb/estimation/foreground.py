@@ -10,8 +10,8 @@ import numpy as np
 from ros_3d_bb.core.labels import PERSON
 from ros_3d_bb.estimation.box3d import (Box3D, complete_truncated_extent, slopes_down, truncated_edges,
                                         without_distortion)
-from ros_3d_bb.estimation.depth_samples import (BESIDE_TRUNK_M, BODY_HALF_DEPTH_MM, FEET_M, LOOKS_DOWN, RectSamples,
-                                                camera_rays)
+from ros_3d_bb.estimation.depth_samples import (BESIDE_TRUNK_M, BODY_HALF_DEPTH_MM, FEET_M, LEAST_SIZE, LOOKS_DOWN,
+                                                RectSamples, camera_rays)
 from ros_3d_bb.estimation.overlaps import Overlaps
 
 LEAST_MEASURED = 0.02  # minimum share of the samples with depth for an estimate; chosen: a lidar gives twice as many
@@ -27,7 +27,8 @@ FILLED = 0.4  # minimum share of both sides of a rectangle that background behin
 
 def estimate_foreground(depth, rects_px, geometry, kinds):
     """Estimate a box from the depth layer of the object in each rectangle of an image: the nearest layer that is
-    dominant near the middle of the rectangle.
+    dominant near the middle of the rectangle. Furniture in front of a person is lower than people are, and does not
+    reach the upper edge: what does is the person.
 
     Background beside and between the limbs may fill most of a rectangle, but it is farther away. Around a person it
     fills the outline of the rectangle, too, as furniture and other people at the sides do. Flying pixels are too sparse
@@ -57,7 +58,8 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
         for number, rect_px in enumerate(rects_px):
             truncated.append(truncated_edges(rect_px, geometry.area_px))
             surrounded = _surrounded(kinds[number], truncated[number])
-            samples.append(RectSamples(depth, rect_px, rays, geometry.level_axes, surrounded))
+            least_m = _least_height(kinds[number], truncated[number])
+            samples.append(RectSamples(depth, rect_px, rays, geometry.level_axes, surrounded, least_m))
             rows, columns = samples[number].shape
             has_depth = samples[number].measured >= max(LEAST_MEASURED * rows * columns, 1)
             if has_depth and math.isfinite(sum(flat_px[number])):
@@ -81,6 +83,14 @@ def _surrounded(kind, truncated):
     is the floor, or what hides their legs.
     """
     return tuple([kind.group == PERSON and not is_cut for is_cut in truncated[:3]])
+
+
+def _least_height(kind, truncated):
+    """Least height of people, metres; 0 if it is unknown, as of other objects, and where the left or the right image
+    border truncates them, so that it is not known what surrounds them.
+    """
+    cut_left, _cut_top, cut_right, _cut_bottom = truncated
+    return 0.0 if kind.group != PERSON or cut_left or cut_right else LEAST_SIZE * kind.height
 
 
 class _Extents(NamedTuple):

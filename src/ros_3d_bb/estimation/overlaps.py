@@ -1,12 +1,11 @@
 """Occlusion: order of the objects in overlapping rectangles by depth, and masks of what nearer ones show in them."""
-from ros_3d_bb.estimation.depth_samples import BODY_HALF_DEPTH_MM, UNKNOWN_MM
+from ros_3d_bb.estimation.depth_samples import BODY_HALF_DEPTH_MM, LEAST_SIZE, UNKNOWN_MM
 
 # All are chosen; test_difficult_views.py checks them.
 CUT_ROWS = 1 / 30.0  # share of the image height at which the lower edges of truncated boxes are compared
 SAME_LAYER_M = 0.25  # largest difference of the layers of parts of one body
 CLEARLY_NEARER_M = 0.1
 CLEARLY_LOWER = 0.02  # share of the image height: nearer people stand lower in the image
-LEAST_SIZE = 0.65  # minimum share of its usual size that an object appears to have at its layer: a hidden chair, 0.6
 LEAST_BESIDE = 0.25  # minimum share of a rectangle beside another one that shows a layer of its own
 CONTAINED = 0.8  # minimum share of a second rectangle of an object in the first one
 # For speed, and more than in a crowd: of more rectangles, those that few others occlude are foremost, too, and a part
