@@ -5,8 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ros_3d_bb.camera.camera_model import transform_from
-from ros_3d_bb.planning.planner_view import (covariances_after, footprint_points, in_frame, position_after, predicted_to,
-                                                usable_tracks)
+from ros_3d_bb.planning.planner_view import (covariances_after, footprint_points, in_frame, position_after,
+                                             predicted_to, usable_tracks)
 from ros_3d_bb.tracking.types import OUT_OF_VIEW
 from ros_3d_bb_lab.simulation.simulator import upright
 from support.tracks import track_at

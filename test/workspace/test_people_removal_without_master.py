@@ -108,7 +108,8 @@ def test_compressed_depth_is_sent_as_an_image(people):
                        np.full((48, 64), 2000, np.uint16), '16UC1')
     with node_with('depth', *people) as connections:
         connections.send('~camera_info', camera_info(STAMP_NS))
-        values = imgmsg_to_depth(sent(connections, 'depth', CompressedImage(**compressed_fields(depth, 'compressedDepth png')))).values
+        compressed = CompressedImage(**compressed_fields(depth, 'compressedDepth png'))
+        values = imgmsg_to_depth(sent(connections, 'depth', compressed)).values
     assert (values[24, 32] == 0) == bool(people) and values[0, 0] == 2000
 
 

@@ -14,7 +14,8 @@ from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS, topic_of
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
-from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, TRACKS_TOPIC, camera_from_msg, time_from, transform_from_msg
+from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, TRACKS_TOPIC, camera_from_msg, time_from,
+                                                   transform_from_msg)
 from ros_3d_bb.conversions.planner_msgs import points_to_msg
 from ros_3d_bb.core.params import SET_BY_LAUNCH, Param, parameters
 from ros_3d_bb.core.time_sync import NS
