@@ -8,6 +8,7 @@ from hypothesis import assume, given, settings, strategies as st
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.tracking.occlusion import classify_visibility, depths_towards
+from ros_3d_bb.tracking.track import PRESENT
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView
 from support.cylinders import mounted
 
@@ -101,7 +102,7 @@ def test_a_pole_before_an_arm_does_not_occlude_the_person():
 
 
 @pytest.mark.parametrize('x,depth_mm,expected', [
-    (0.9, 850, OUT_OF_VIEW), (0.9, 4000, VISIBLE), (0.9, 0, VISIBLE), (3, 2950, VISIBLE)])
+    (0.9, 850, PRESENT), (0.6, 550, PRESENT), (0.9, 4000, VISIBLE), (0.9, 0, VISIBLE), (3, 2950, VISIBLE)])
 def test_a_person_too_near_for_most_of_the_body_is_expected_only_where_the_depth_shows_nobody(x, depth_mm, expected):
     assert place(x, 0, with_depth(np.full((480, 640), depth_mm))) == expected
 

@@ -3,12 +3,16 @@
 `FRONT` stands at the origin of the map, 1 m up, and looks along x, `LEFT` 45 degrees to the left of that. Each sees 31
 degrees to either side, so that both see what is from 14 to 31 degrees to the left.
 """
+import functools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.out_of_sequence import LATEST_NS, MAX_WAIT_NS, MOST_KEPT, MOST_SKIPPED
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView, Detection
@@ -63,6 +67,22 @@ def standing(bearing):
 
 def ids(objects):
     return [track.id for track in objects]
+
+
+@pytest.mark.parametrize('views', [('low',), ('low', 'left')])
+def test_a_person_before_a_low_camera_stays_while_the_place_is_occupied(views):
+    """The detector finds the person in the first second only."""
+    def cameras(depth_m):
+        depth = DepthImage(np.full((480, 640), 1000 * depth_m, np.uint16), 0.001)
+        low = CameraView(mounted(0.2), CAMERA, 'low', functools.partial(depths_towards, CAMERA, depth))
+        return [{'low': low, 'left': LEFT}[name] for name in views]
+    tracker, place_m = Tracker(), (1.0, 0.0)
+    play(tracker, images_of(1, lambda _time_s: place_m, cameras(0.95)))
+    occupied = play(tracker, images_of(10, lambda _time_s: None, cameras(0.95), start_s=1))
+    assert all([(track.id, track.status) for track in objects] == [(1, OCCLUDED)] for objects in occupied[len(views):])
+    assert np.sqrt(occupied[-1][0].covariance[0, 0]) < 0.4
+    free = play(tracker, images_of(1, lambda _time_s: None, cameras(4.0), start_s=11))
+    assert free[-1] == []
 
 
 def test_a_person_who_walks_from_one_view_to_the_other_keeps_the_id():

@@ -26,7 +26,8 @@ SCENARIO = os.path.join(ROOT, 'config', 'scenarios', 'empty_room.yaml')
 MORE_PARAMS = {'planner_bridge_node': {'outputs': 'costmap, people, teb, mpc, vision'},
                'tracker_node': {'use_map': True},
                'realsense_node': {'publish_clock': True}, 'replay_node': {'boxes': True},
-               'navigation_trial_node': dict(scenario=SCENARIO, tracks=True, cloud=True, visible=True, scan=True),
+               'navigation_trial_node': dict(scenario=SCENARIO, tracks=True, boxes=True, cloud=True, visible=True,
+                                             scan=True),
                'simulator_node': {'scenario': SCENARIO, 'publish_clock': True, 'drive': True, 'boxes': True,
                                   'supervised': True}}
 OTHERS = {'realsense_node': RealSenseNode, 'replay_node': ReplayNode, 'simulator_node': SimulatorNode,

@@ -22,9 +22,9 @@ class TransformBuffer(tf2_ros.BufferCore):
     """tf2 buffer for `lookup` at the stamps of images.
 
     After a backward jump in time, or one transform with a stamp in the future, tf2 rejects the transforms of a frame.
-    If a lookup at their time fails because of this, or the latest transforms are looked up, the buffer is cleared,
-    except for static transforms, and the recent transforms up to that time are added again. Rejected transforms of
-    other frames, or of another time than that of the lookup, have no effect, as in tf2.
+    If a lookup at their time fails because of this, or at `forget_later`, the buffer is cleared, except for static
+    transforms, and the recent transforms up to that time are added again. Rejected transforms of other frames, or of
+    another time than that of the lookup, have no effect, as in tf2.
     """
 
     def __init__(self):
@@ -61,11 +61,8 @@ class TransformBuffer(tf2_ros.BufferCore):
         self._start()
 
     def lookup(self, target_frame, source_frame, stamp):
-        """Look up `target_from_source`, a 4x4 matrix, at a stamp, 0 for the latest one. Raises
-        tf2_ros.TransformException."""
+        """Look up `target_from_source`, a 4x4 matrix, at a stamp. Raises tf2_ros.TransformException."""
         target, source = target_frame.lstrip('/'), source_frame.lstrip('/')
-        if stamp.is_zero():
-            self._forget_later(target, source)
         try:
             return transform_from_msg(self.lookup_transform_core(target, source, stamp))
         except tf2_ros.TransformException:
@@ -73,6 +70,14 @@ class TransformBuffer(tf2_ros.BufferCore):
                 raise
         self._clear_after(stamp.to_sec() + CACHE_S)
         return transform_from_msg(self.lookup_transform_core(target, source, stamp))
+
+    def forget_later(self, target_frame, source_frame):
+        """Forget what is later than the latest transforms of a frame between two others, if those were rejected."""
+        between = self._between(target_frame.lstrip('/'), source_frame.lstrip('/'))
+        rejected = [self._rejected[frame] for frame in between if frame in self._rejected]
+        stamps_s = [stamp_s for count, stamp_s in rejected if count >= REJECTED]
+        if stamps_s:
+            self._clear_after(max(stamps_s) + CACHE_S)
 
     def link_to_root(self, target_frame, frame, target_from_frame):
         """The transform (parent, child, parent_from_child (4, 4)) to the root of the tree of a frame that gives it a
@@ -90,13 +95,6 @@ class TransformBuffer(tf2_ros.BufferCore):
     def _is_blocked(self, target, source, stamp_s):
         """Whether transforms at a stamp were rejected of a frame between two others. A stamp of 0 means the latest."""
         return any(0 < stamp_s < self._rejected_before_s.get(frame, 0) for frame in self._between(target, source))
-
-    def _forget_later(self, target, source):
-        """Forget what is later than the latest transforms of a frame between two others, if those were rejected."""
-        rejected = [self._rejected[frame] for frame in self._between(target, source) if frame in self._rejected]
-        stamps_s = [stamp_s for count, stamp_s in rejected if count >= REJECTED]
-        if stamps_s:
-            self._clear_after(max(stamps_s) + CACHE_S)
 
     def _between(self, target, source):
         return set(path_to_root(self._parents, target)) ^ set(path_to_root(self._parents, source))

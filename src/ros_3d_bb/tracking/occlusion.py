@@ -10,7 +10,7 @@ import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.kalman_filter import State
-from ros_3d_bb.tracking.track import SEEN
+from ros_3d_bb.tracking.track import PRESENT, SEEN
 from ros_3d_bb.tracking.types import NEARER_M, OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView, wrapped
 
 # All are chosen; `./run bench scenes` and `./run bench tracking` show the effect of others.
@@ -25,9 +25,10 @@ HIDDEN_BEHIND_M = 0.5  # measured depth nearer than the person by more than this
 HIDDEN_SHARE = 0.5
 ACROSS, ALONG = np.meshgrid((-0.6, 0, 0.6), (-0.8, -0.4, 0, 0.4, 0.8))  # depth sample points, in half extents
 
-STATUS = {VISIBLE: OCCLUDED, OCCLUDED: OCCLUDED, OUT_OF_VIEW: OUT_OF_VIEW, SEEN: VISIBLE}
+STATUS = {VISIBLE: OCCLUDED, OCCLUDED: OCCLUDED, OUT_OF_VIEW: OUT_OF_VIEW, PRESENT: OCCLUDED, SEEN: VISIBLE}
 RECENT_NS = NS  # a camera whose latest image is older is ignored
 BEHIND_M = 0.45  # upper bound of the position's standard deviation of a person who stays behind an occluder
+PRESENT_M = 0.3  # the same of one whose place is occupied
 OCCLUDING_S = 0.3  # a track missed for longer does not occlude others
 
 
@@ -52,7 +53,7 @@ def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_p
     """Update undetected tracks in place: status, visibility, and the times for which they are unseen and missed.
 
     An occluded person who is predicted to reappear but is not detected is assumed to stay behind the occluder: the
-    track keeps its previous position.
+    track keeps its previous position. A person whose place is occupied does not become less certain than `PRESENT_M`.
 
     `missed` are those of the `tracks` that are not detected; they are predicted to the stamp of the image. `before` are
     the tracks after the previous image. `cameras` maps each camera to its CameraState; `camera` is that of the image,
@@ -74,14 +75,18 @@ def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_p
     for track in missed:
         track.set_visibility(camera, seen[track.id])
         best = min([seen[track.id]] + [track.visibility.get(name, OUT_OF_VIEW) for name in others])
+        if best == PRESENT and not track.is_confirmed:
+            best = OUT_OF_VIEW
+        if best == PRESENT and track.state.position_m2 > PRESENT_M ** 2:
+            track.state = State(*(track.state[:4] + before[track.id].state[4:]))
         if best == OCCLUDED and track.id in staying:
             track.state = _held(track.state, before[track.id].state)
-        track.miss(STATUS[best], 0.0 if best == SEEN else observed_s, observed_s if best == VISIBLE else 0.0,
+        track.miss(STATUS[best], 0.0 if best in (SEEN, PRESENT) else observed_s, observed_s if best == VISIBLE else 0.0,
                    detection_probability)
 
 
 def _visibilities(tracks, occluding_m, image):
-    """The visibility {ID: VISIBLE, OCCLUDED or OUT_OF_VIEW} of tracks in the view of a CameraState."""
+    """The visibility {ID: PRESENT, VISIBLE, OCCLUDED or OUT_OF_VIEW} of tracks in the view of a CameraState."""
     if not tracks:
         return {}
     visibility = classify_visibility(image.view, _positions_of(tracks), np.array([track.size_m for track in tracks]),
@@ -110,20 +115,21 @@ def classify_visibility(view, positions_m, sizes_m, others_m, max_range_m):
     """Classify the visibility (n,) of people with centres and extents (n, 3) in a CameraView.
 
     VISIBLE: a detection is expected. OCCLUDED: by a person at one of the centres `others_m` (m, 3), which may contain
-    the people themselves, or by something nearer in the depth image. OUT_OF_VIEW: also beyond the detector's range, or
-    with so little of the body in the image that detectors often miss it, while the depth shows that it is there.
+    the people themselves, or by something nearer in the depth image. OUT_OF_VIEW: also beyond the detector's range.
+    PRESENT: with so little of the body in the image that detectors often miss it, while its place is occupied in the
+    depth image.
     """
     distances_m, bearings = view.bearings(positions_m)
     visibility = np.full(len(positions_m), VISIBLE)
     visibility[_behind_people(distances_m, bearings, *view.bearings(others_m))] = OCCLUDED
     shares = _shares_in_image(view, positions_m, sizes_m[:, 2], bearings)
-    visibility[_out_of_range(view, positions_m, sizes_m, distances_m, max_range_m)
-               | (shares < LEAST_IN_IMAGE)] = OUT_OF_VIEW
-    undecided = np.flatnonzero(visibility == VISIBLE)
+    out_of_range = _out_of_range(view, positions_m, sizes_m, distances_m, max_range_m)
+    visibility[out_of_range | (shares < LEAST_IN_IMAGE)] = OUT_OF_VIEW
+    undecided = np.flatnonzero((visibility != OCCLUDED) & ~out_of_range & (shares > 0))
     if view.depth_at is not None and len(undecided):
         hidden, present = _in_depth(view, positions_m[undecided], sizes_m[undecided])
-        visibility[undecided[hidden]] = OCCLUDED
-        visibility[undecided[present & (shares[undecided] < RELIABLE_IN_IMAGE)]] = OUT_OF_VIEW
+        visibility[undecided[hidden & (visibility[undecided] == VISIBLE)]] = OCCLUDED
+        visibility[undecided[present & (shares[undecided] < RELIABLE_IN_IMAGE)]] = PRESENT
     return visibility
 
 

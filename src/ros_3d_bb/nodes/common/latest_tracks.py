@@ -89,7 +89,7 @@ class RobotTracks(LatestTracks):
         if newest is None:
             return None
         try:
-            robot_from_tracks = self._transforms.lookup(self._robot_frame, newest.frame_id, rospy.Time())
+            robot_from_tracks = self._transforms.latest(self._robot_frame, newest.frame_id)
         except tf2_ros.TransformException as error:
             self._diagnostics.warn('no transform', 'no transform from %s to %s: %s; the robot stands until there is one'
                                    % (newest.frame_id, self._robot_frame, error))

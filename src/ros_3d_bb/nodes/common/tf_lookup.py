@@ -69,6 +69,11 @@ class Transforms(object):
                 self._listener.news.wait(min(left_s, LONGEST_WAIT_S))
         raise type(fault)(self._explanation(frames, stamp) or str(fault))
 
+    def latest(self, target_frame, source_frame):
+        """As `lookup` of the latest transform, which is that received last after a jump in time, too."""
+        self._buffer.forget_later(target_frame, source_frame)
+        return self.lookup(target_frame, source_frame, rospy.Time())
+
     def link_to_root(self, target_frame, frame, target_from_frame):
         """As `TransformBuffer.link_to_root`."""
         return self._buffer.link_to_root(target_frame, frame, target_from_frame)
