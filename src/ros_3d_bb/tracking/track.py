@@ -35,8 +35,8 @@ CUT_LASTS_NS = NS // 2  # hysteresis: an end is visible again this long after it
 LEAST_HEIGHT_M = 0.1
 STILL_MOVING = 0.5  # hysteresis: a moving track stops below this share of `moving_speed`
 NEVER_NS = -10 ** 18
-# Visibility of a detected track, and of one that is not detected, but whose place is occupied in the depth image; they rank
-# before VISIBLE, OCCLUDED and OUT_OF_VIEW.
+# Visibility of a detected track, and of one that is not detected, but whose place is occupied in the depth image. They
+# rank before VISIBLE, OCCLUDED and OUT_OF_VIEW.
 SEEN, PRESENT = -2, -1
 LEAST_SPEED2 = 1e-12  # avoids a division by zero
 # Prediction. Chosen for recorded pedestrians by kind of motion; `./run bench prediction` shows the effect of others.
