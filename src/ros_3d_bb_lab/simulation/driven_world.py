@@ -12,8 +12,9 @@ from ros_3d_bb_lab.simulation.driving import limited_velocity, measured_velocity
 from ros_3d_bb_lab.simulation.gait import Posture, stride_m
 from ros_3d_bb_lab.simulation.motion import WALKING_MPS, State, wrapped
 from ros_3d_bb_lab.simulation.social_force import RELAXATION_S, next_velocity, social_force
-from ros_3d_bb_lab.simulation.simulator import STEP_S, WorldState, upright
+from ros_3d_bb_lab.simulation.simulator import WorldState, upright
 
+LONGEST_STEP_S = 0.01  # of the motion
 COMMAND_TIMEOUT_S = 0.5  # the robot stops if the last command is older
 CONTACT_S = 1.0  # contacts with the same object within this time are one collision
 FACING_MPS = 0.2  # at this speed people face the direction of walking
@@ -74,7 +75,7 @@ class DrivenWorld(object):
         """Advance to a time since the start and return the WorldState. Raises ValueError if the time is in the past."""
         if time_s < self._time_s:
             raise ValueError('time %g is before the current time %g of the world' % (time_s, self._time_s))
-        steps = int(np.ceil((time_s - self._time_s) / STEP_S - 1e-6))
+        steps = int(np.ceil((time_s - self._time_s) / LONGEST_STEP_S - 1e-6))
         for time_after_s in np.linspace(self._time_s, time_s, steps + 1)[1:]:
             self._step(float(time_after_s))
         map_from_robot, odom_from_robot = (upright(x, y, 0, yaw) for x, y, yaw in (self._pose, self._odometry))
