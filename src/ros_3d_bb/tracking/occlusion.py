@@ -17,7 +17,7 @@ from ros_3d_bb.tracking.types import NEARER_M, OCCLUDED, OUT_OF_VIEW, VISIBLE, C
 EDGE_RAD = 0.04  # people this close to the image border are not detected reliably
 NEAREST_M = 0.45  # neither are people this close to the camera
 LEAST_IN_IMAGE = 0.2  # minimum share of the body axis inside the image for a person to be detected
-RELIABLE_IN_IMAGE = 0.5  # detectors often miss a person of whom the image shows less
+RELIABLE_IN_IMAGE = 0.5  # detectors often fail if less of the body axis is in the image
 AXIS_SAMPLES = np.linspace(-0.48, 0.48, 11)  # samples of the body axis, as fractions of the height from the centre
 BODY_RADIUS_M = 0.27
 SEEN_BESIDE = 0.2  # an occluding person leaves at most this share of a half width visible: too narrow for a detector
@@ -77,10 +77,11 @@ def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_p
         best = min([seen[track.id]] + [track.visibility.get(name, OUT_OF_VIEW) for name in others])
         if best == PRESENT and not track.is_confirmed:
             best = OUT_OF_VIEW
-        if best == PRESENT and track.state.position_m2 > PRESENT_M ** 2:
-            track.state = State(*(track.state[:4] + before[track.id].state[4:]))
-        if best == OCCLUDED and track.id in staying:
-            track.state = _held(track.state, before[track.id].state)
+        if best == PRESENT:
+            track.state = State(*(track.state[:4] + _bounded(track.state, before[track.id].state, PRESENT_M)))
+        elif best == OCCLUDED and track.id in staying:  # at the previous position
+            former = before[track.id].state
+            track.state = State(*(former[:4] + _bounded(track.state, former, BEHIND_M)))
         track.miss(STATUS[best], 0.0 if best in (SEEN, PRESENT) else observed_s, observed_s if best == VISIBLE else 0.0,
                    detection_probability)
 
@@ -100,11 +101,10 @@ def _staying(tracks, before, occluding_m, image):
     return set(track_id for track_id, seen in visibility.items() if seen == OCCLUDED)
 
 
-def _held(predicted, former):
-    """The previous State of a person who stays behind an occluder; its position becomes less certain up to a limit."""
-    if predicted.position_m2 > BEHIND_M ** 2:
-        return former
-    return State(*(former[:4] + predicted[4:]))
+def _bounded(predicted, former, most_m):
+    """The covariance of a predicted State; that of the former one where the position would be less certain than this
+    standard deviation."""
+    return (former if predicted.position_m2 > most_m ** 2 else predicted)[4:]
 
 
 def _positions_of(tracks):
