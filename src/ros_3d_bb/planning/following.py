@@ -173,7 +173,7 @@ class Follower(object):
 
     def update(self, tracks, stamp_ns, robot_from_tracks):
         """Take the tracks of an image. `robot_from_tracks` (4, 4) is the pose of their frame at this time."""
-        robot_m = np.linalg.inv(robot_from_tracks)[:2, 3]
+        robot_m = _position_of(robot_from_tracks)
         self.person = self.selector.select(tracks, stamp_ns, robot_m, self._params)
 
     def command(self, tracks, age_s, robot_from_tracks, step_s):
@@ -203,7 +203,7 @@ class Follower(object):
         the person; None without a person."""
         if self.person is None:
             return None
-        robot_m, person_m = np.linalg.inv(robot_from_tracks)[:2, 3], position_after(self.person, age_s)[:2]
+        robot_m, person_m = _position_of(robot_from_tracks), position_after(self.person, age_s)[:2]
         x, y = person_m - robot_m
         yaw, ahead_m = math.atan2(y, x), max(math.hypot(x, y) - self._params.distance, 0.0)
         return robot_m[0] + ahead_m * math.cos(yaw), robot_m[1] + ahead_m * math.sin(yaw), yaw
@@ -229,4 +229,9 @@ def is_new_goal(before, goal):
 
 def is_reached(goal, robot_from_tracks):
     """Whether the robot is at the position of a goal (x, y, yaw); `robot_from_tracks` (4, 4) is its pose."""
-    return np.linalg.norm(np.linalg.inv(robot_from_tracks)[:2, 3] - goal[:2]) <= NEW_GOAL_M
+    return np.linalg.norm(_position_of(robot_from_tracks) - goal[:2]) <= NEW_GOAL_M
+
+
+def _position_of(robot_from_tracks):
+    """Position (2,) of the robot in the frame of the tracks."""
+    return np.linalg.inv(robot_from_tracks)[:2, 3]
