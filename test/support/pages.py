@@ -1,4 +1,4 @@
-"""doc/node_pages.py, which is no part of an installed package, as a module."""
+"""doc/node_pages.py and doc/figures.py, which are no part of an installed package, as modules."""
 import importlib.util
 import os
 import sys
@@ -6,7 +6,13 @@ import sys
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 DOC = os.path.join(ROOT, 'doc')
 
-_specification = importlib.util.spec_from_file_location('node_pages', os.path.join(DOC, 'node_pages.py'))
-node_pages = importlib.util.module_from_spec(_specification)
-sys.modules['node_pages'] = node_pages  # its types ask for their module
-_specification.loader.exec_module(node_pages)
+
+def _module(name):
+    specification = importlib.util.spec_from_file_location(name, os.path.join(DOC, name + '.py'))
+    module = importlib.util.module_from_spec(specification)
+    sys.modules[name] = module  # its types ask for their module
+    specification.loader.exec_module(module)
+    return module
+
+
+node_pages, figures = _module('node_pages'), _module('figures')

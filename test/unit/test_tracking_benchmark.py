@@ -106,6 +106,7 @@ def test_the_command_writes_settings_and_scores(monkeypatch, tmp_path, capsys):
     run_command(monkeypatch, '--seed', '5', '--seconds', '2', '--repetitions', '1', '--json', str(path))
     result = json.loads(path.read_text())
     assert result['sequences'] == ['made_sparse', 'made_dense'] and result['seed'] == 5 and not result['recorded']
+    assert result['command'].startswith('./run bench tracking --seed 5 ')
     assert set(result['prediction']) == {'made_sparse', 'made_dense', 'mean'}
     assert {'ours', 'thesis', 'library'} <= set(result['trackers'])
     for name, scores in result['trackers'].items():

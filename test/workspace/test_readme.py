@@ -3,12 +3,14 @@ import ast
 import glob
 import os
 import re
+import shutil
 import xml.etree.ElementTree as ElementTree
 
 import pytest
 import yaml
 
 from support.code_blocks import PAGES, ROOT
+from support.pages import figures
 
 NAMED = PAGES + ('doc/error_model.md',)  # its blocks are the record of a campaign
 FORMAT = re.compile(r'%[-+\d.]*[a-zA-Z]')
@@ -54,7 +56,23 @@ def test_messages_in_the_table_of_symptoms_are_in_the_code():
 @pytest.mark.parametrize('name', sorted(FIGURES))
 def test_pages_quote_the_measured_figure(name):
     for page, quote in FIGURES[name]['quotes'].items():
-        assert quote.format(FIGURES[name]['value']) in ' '.join(text_of(page).split()), page
+        assert ' '.join(text_of(page).split()).count(quote.format(FIGURES[name]['value'])) == 1, page
+
+
+def test_a_new_measurement_is_written_to_the_pages(tmp_path):
+    for page in ['doc/figures.yaml'] + [page for figure in FIGURES.values() for page in figure['quotes']]:
+        (tmp_path / page).parent.mkdir(exist_ok=True)
+        shutil.copy(os.path.join(ROOT, page), str(tmp_path / page))
+    hota, ahead_m = {'ours': 84.26, 'thesis': 50.0, 'library': 78.1}, {'ours': 0.504, 'library': 0.604}
+    result = {'trackers': {name: {'hota': hota[name], 'fde_2s_m': ahead_m.get(name)} for name in hota},
+              'command': './run bench tracking --json some.json'}
+    written = figures.write(result, str(tmp_path))
+    assert written == ['hota', 'hota_thesis', 'hota_norfair', 'prediction_2s_m', 'prediction_2s_norfair_m']
+    assert 'HOTA **84.3** (Norfair **78.1**, thesis **50.0**)' in (tmp_path / 'README.md').read_text(encoding='utf-8')
+    new = yaml.safe_load((tmp_path / 'doc' / 'figures.yaml').read_text(encoding='utf-8'))
+    assert [new[name]['value'] for name in written] == [84.3, 50.0, 78.1, 0.5, 0.6]
+    for command in ('./run bench tracking --seed 1', './run bench tracking --rates', './run bench prediction'):
+        assert figures.write(dict(result, command=command), str(tmp_path)) == []
 
 
 def test_each_bold_figure_of_the_readme_is_a_measured_one():

@@ -4,6 +4,7 @@ import glob
 import json
 import os
 import platform
+import sys
 
 import numpy as np
 
@@ -42,10 +43,10 @@ def data_folder(name):
 
 
 def write_json(path, result):
-    """Write a result to a file, if there is a path."""
+    """Write a result and the command that gave it to a file, if there is a path."""
     if path:
         with open(path, 'w') as stream:
-            json.dump(result, stream, indent=1)
+            json.dump(dict(result, command=' '.join(sys.argv)), stream, indent=1)
 
 
 def describe_machine():

@@ -60,7 +60,10 @@ def measured(case, arguments, bag, folder):
         with open(log) as stream:
             raise RuntimeError('%s: nothing was measured. The log:\n%s' % (case.name, stream.read()))
     result = dict(name=case.name, detector=case.name.split('+')[0], load='one core' if case.loaded else 'none')
-    return dict(result, load_average=recorded['load_average'], **result_of(recorded))
+    result.update(result_of(recorded), load_average=recorded['load_average'])
+    nodes = [node for node in result['cpu_percent']
+             if node not in HARNESS and not node.endswith((LIMIT, SUBSCRIBING))]
+    return dict(result, pipeline={key: sum(result[key][node] for node in nodes) for key in ('cpu_percent', 'rss_mb')})
 
 
 @contextlib.contextmanager
@@ -77,12 +80,10 @@ def cpu_load(cores):
 
 def row(result):
     """Format a result as a line of the table."""
-    nodes = [node for node in result['cpu_percent']
-             if node not in HARNESS and not node.endswith((LIMIT, SUBSCRIBING))]
     times = ['-' if result[key] is None else '%.1f' % result[key] for key in ('p50_ms', 'p95_ms', 'p99_ms')]
     return COLUMNS % ((result['name'], '%.1f' % result['input_hz'], '%.1f' % result['output_hz']) + tuple(times) + (
-        result['dropped'], '%.1f' % sum(result['cpu_percent'][node] for node in nodes),
-        '%.1f' % result['cpu_percent'].get('replay_node', 0), '%.0f' % sum(result['rss_mb'][node] for node in nodes),
+        result['dropped'], '%.1f' % result['pipeline']['cpu_percent'],
+        '%.1f' % result['cpu_percent'].get('replay_node', 0), '%.0f' % result['pipeline']['rss_mb'],
         '%.1f' % result['load_average']))
 
 
