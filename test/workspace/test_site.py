@@ -26,7 +26,7 @@ def test_the_site_has_every_page_and_formulas_without_scripts(tmp_path):
 
 @pytest.mark.parametrize('path', sorted(glob.glob(os.path.join(ROOT, '*.md')) + glob.glob(os.path.join(DOC, '*.md'))),
                          ids=os.path.basename)
-def test_no_line_is_left_out_as_a_comment(path):
-    """MyST takes lines that begin with a percent sign for comments."""
+def test_no_line_is_taken_for_a_comment_or_an_item(path):
+    """MyST takes lines that begin with a percent sign for comments, Markdown those with a plus sign for items."""
     with open(path, encoding='utf-8') as stream:
-        assert not re.search('^ *%', stream.read(), re.MULTILINE)
+        assert not re.search(r'^ *(%|\+ )', stream.read(), re.MULTILINE)
