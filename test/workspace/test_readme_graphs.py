@@ -23,6 +23,7 @@ LOADED = {  # beginning of a block: nodes that it starts
     'roslaunch ros_3d_bb pipeline.launch weights:=$HOME/yolov5n.pt rviz:=true': PIPELINE | {'/rviz'},
     'roslaunch ros_3d_bb pipeline.launch weights:=$HOME/yolov5n.pt error_model:=': PIPELINE,
     'roslaunch ros_3d_bb pipeline.launch cameras:=front,rear': {'/front/bbox3d_node', '/rear/bbox3d_node', '/rviz'},
+    '# each in its own terminal\n': {'/front/bbox3d_node', '/rear/bbox3d_node', '/tracker_node'},
     'roslaunch ros_3d_bb realsense.launch\n': {'/camera_realsense'},
     'roslaunch ros_3d_bb realsense.launch camera:=front': {'/front_realsense'},
     'roslaunch ros_3d_bb realsense.launch camera:=rear': {'/rear_realsense'},
