@@ -15,6 +15,6 @@ document.addEventListener('DOMContentLoaded', () => {
       cell.dataset.title = cell.textContent && titles[cell.cellIndex];
       cell.innerHTML = cell.innerHTML.replace(/(\d) (%|(?:mm?|m?s|m\/s|MB|Hz)\b)/g, '$1&nbsp;$2');
     }
-    for (const code of table.querySelectorAll('code span.pre')) code.innerHTML = code.innerHTML.replace(/\b[/_]/g, '$&<wbr>');
+    for (const code of table.querySelectorAll('code span.pre')) code.innerHTML = code.innerHTML.replace(/(?<=\w)[/_]/g, '$&<wbr>');
   }
 });
