@@ -88,10 +88,16 @@ class RobotTracks(LatestTracks):
         newest, age_s = self.newest()
         if newest is None:
             return None
-        try:
-            robot_from_tracks = self._transforms.latest(self._robot_frame, newest.frame_id)
-        except tf2_ros.TransformException as error:
-            self._diagnostics.warn('no transform', 'no transform from %s to %s: %s; the robot stands until there is one'
-                                   % (newest.frame_id, self._robot_frame, error))
+        robot_from_tracks = self.robot_from(newest.frame_id)
+        if robot_from_tracks is None:
             return None
         return TracksAround(*newest, age_s=age_s, robot_from_tracks=robot_from_tracks)
+
+    def robot_from(self, frame_id):
+        """Return the current pose of a frame in that of the robot, (4, 4); None if it is unknown."""
+        try:
+            return self._transforms.latest(self._robot_frame, frame_id)
+        except tf2_ros.TransformException as error:
+            self._diagnostics.warn('no transform', 'no transform from %s to %s: %s; waiting for it'
+                                   % (frame_id, self._robot_frame, error))
+            return None
