@@ -24,7 +24,7 @@ def test_modes_differ_in_what_move_base_knows_of_people(mode):
     is_tracked = mode in PIPELINE
     assert {'people_node', 'bbox3d_node', 'tracker_node'} & set(nodes) == PIPELINE.get(mode, set())
     assert parameters['/simulator_node/boxes'] == is_tracked
-    assert parameters.get('/tracker_node/tracker') == {'ours': 'kalman', 'limited': 'kalman', 'thesis': 'thesis'}.get(mode)
+    assert (parameters.get('/tracker_node/tracker') == 'thesis') == (mode == 'thesis')
     assert (['ground_truth', 'ros_3d_bb/tracks'] in nodes['simulator_node'].remap_args) == (mode == 'truth')
     layers = [layer['name'] for layer in parameters['/move_base/local_costmap/plugins']]
     assert layers == ['static_layer'] + {
