@@ -42,8 +42,8 @@ class FollowNode(object):
     ~recover_within, it must be enabled again. The robot keeps a speed at which it can stop before all tracked people
     (`highest_safe_speed`). With ~output cmd_vel, it knows no obstacles other than people.
 
-    If the tracks stop for ~timeout, or the pose of the robot is unknown, one zero command is published at once, and
-    then nothing, as when the node is disabled or ends. With ~output goal, the goal is cancelled instead.
+    If there are no tracks or no new pose of the robot for ~timeout, one zero command is published at once, and then
+    nothing, as when the node is disabled or ends. With ~output goal, the goal is cancelled instead.
     Parameters: config/follow.yaml.
 
     Publishes

@@ -30,10 +30,10 @@ class SpeedLimitNode(object):
     """Publish the highest safe speed among tracked people, and limit velocity commands to it.
 
     Each command on cmd_vel_in gives one on cmd_vel, with the same path. The speed is safe if the robot can stop before
-    it reaches a person, wherever the person will be until then, see `highest_safe_speed`. Without tracks for ~timeout,
-    or without the pose of the robot, the limit is 0, and rotations in place end, too. People who are not tracked,
-    such as those behind the camera, are unknown to the node. It does not publish by itself: the base must stop if it
-    receives no commands. Parameters: config/speed_limit.yaml.
+    it reaches a person, wherever the person will be until then, see `highest_safe_speed`. Without tracks or a new pose
+    of the robot for ~timeout, the limit is 0, and rotations in place end, too. People who are not tracked, such as
+    those behind the camera, are unknown to the node. It does not publish by itself: the base must stop if it receives
+    no commands. Parameters: config/speed_limit.yaml.
 
     Subscribes
     ----------

@@ -64,7 +64,7 @@ class LatestTracks(object):
 
 
 class RobotTracks(LatestTracks):
-    """As LatestTracks, with the pose of the robot.
+    """As LatestTracks, with the pose of the robot, to which the same timeout applies.
 
     Subscribes
     ----------
@@ -84,14 +84,20 @@ class RobotTracks(LatestTracks):
         super(RobotTracks, self).__init__(diagnostics, timeout_s, on_tracks)
 
     def around(self):
-        """Return TracksAround, None if the tracks are too old or the pose is unknown."""
+        """Return TracksAround, None if the tracks or the pose are older than the timeout, or the pose is unknown."""
         newest, age_s = self.newest()
         if newest is None:
             return None
         try:
             robot_from_tracks = self._transforms.latest(self._robot_frame, newest.frame_id)
+            pose_age_s = self._transforms.age_of_latest(self._robot_frame, newest.frame_id)
         except tf2_ros.TransformException as error:
             self._diagnostics.warn('no transform', 'no transform from %s to %s: %s; the robot stands until there is one'
                                    % (newest.frame_id, self._robot_frame, error))
+            return None
+        if pose_age_s > self._timeout_s:
+            self._diagnostics.warn('old transform', 'the latest transform from %s to %s is %.1f s old, more than '
+                                   '~timeout (%g s): the robot stands until there is a newer one'
+                                   % (newest.frame_id, self._robot_frame, pose_age_s, self._timeout_s))
             return None
         return TracksAround(*newest, age_s=age_s, robot_from_tracks=robot_from_tracks)
