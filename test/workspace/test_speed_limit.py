@@ -1,6 +1,7 @@
 """speed_limit_node without a master: which commands pass."""
 import contextlib
 
+import numpy as np
 import pytest
 from geometry_msgs.msg import TransformStamped
 from std_msgs.msg import Header
@@ -35,6 +36,12 @@ class Robot(object):
         self._connections.send('cmd_vel_in', velocity_to_msg(1.0, 0.0, 0.0))
         return self._connections.publishers['cmd_vel'].newest.linear.x
 
+    def limit(self):
+        """The published limit."""
+        (_period_s, on_timer), = self._connections.timers
+        on_timer(None)
+        return self._connections.publishers['~speed_limit'].newest.data
+
 
 @contextlib.contextmanager
 def robot_with(**params):
@@ -66,3 +73,13 @@ def test_a_person_ahead_limits_the_command():
     with robot_with() as robot:
         robot.send_tf(START_NS)
         assert robot.forwarded(START_NS, track_at([1.2, 0, 0.9], [0, 0, 0], moving=False)) < 0.7
+
+
+def test_the_robot_stops_before_the_whole_length_of_a_bicycle_seen_from_the_front():
+    """Its length is 1.75 m, half of which, and the robot and the clearance, leave 1.175 m."""
+    bicycle = track_at([2.5, 0, 0.5], [0, 0, 0], moving=False)._replace(label='bicycle', size_m=np.array([0.6, 0.6, 1.1]))
+    with robot_with(highest_speed=2.0) as robot:
+        robot.send_tf(START_NS)
+        robot.forwarded(START_NS, bicycle)
+        speed_mps = robot.limit()
+        assert 1.0 < 0.3 * speed_mps + speed_mps ** 2 / 2 <= 1.175

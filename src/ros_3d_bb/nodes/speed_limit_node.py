@@ -6,7 +6,7 @@ from geometry_msgs.msg import Twist
 from std_msgs.msg import Float32
 
 from ros_3d_bb.conversions.planner_msgs import velocity_from_msg, velocity_to_msg
-from ros_3d_bb.core.params import ROBOT_FRAME, TRACKS_TIMEOUT, parameters
+from ros_3d_bb.core.params import CLASSES_FILE, ROBOT_FRAME, TRACKS_TIMEOUT, parameters
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.latest_tracks import RobotTracks
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
@@ -24,6 +24,7 @@ class SpeedLimitParams(NamedTuple):
 
     robot_frame: str = ROBOT_FRAME
     timeout: float = TRACKS_TIMEOUT
+    classes_file: str = CLASSES_FILE
 
 
 class SpeedLimitNode(object):
@@ -53,7 +54,7 @@ class SpeedLimitNode(object):
         self._diagnostics, self._velocity = Diagnostics(), AHEAD
         self._limit_pub = rospy.Publisher('~speed_limit', Float32, queue_size=1)
         self._velocity_pub = rospy.Publisher('cmd_vel', Twist, queue_size=1)
-        self._tracks = RobotTracks(self._diagnostics, params.timeout, params.robot_frame, lambda _tracks: None)
+        self._tracks = RobotTracks(self._diagnostics, params, lambda _tracks: None)
         subscribe('cmd_vel_in', Twist, self._on_command, 1)
         ReconfigureServer(given, self._reconfigure)
         self._timer = rospy.Timer(rospy.Duration.from_sec(PERIOD_S), self._on_timer, reset=True)
