@@ -77,7 +77,8 @@ def test_a_person_ahead_limits_the_command():
 
 def test_the_robot_stops_before_the_whole_length_of_a_bicycle_seen_from_the_front():
     """Its length is 1.75 m, half of which, and the robot and the clearance, leave 1.175 m."""
-    bicycle = track_at([2.5, 0, 0.5], [0, 0, 0], moving=False)._replace(label='bicycle', size_m=np.array([0.6, 0.6, 1.1]))
+    standing = track_at([2.5, 0, 0.5], [0, 0, 0], moving=False)
+    bicycle = standing._replace(label='bicycle', size_m=np.array([0.6, 0.6, 1.1]))
     with robot_with(highest_speed=2.0) as robot:
         robot.send_tf(START_NS)
         robot.forwarded(START_NS, bicycle)
