@@ -9,7 +9,7 @@ from std_msgs.msg import Float32
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.conversions.perception_msgs import stamp_of
 from ros_3d_bb.conversions.planner_msgs import velocity_from_msg, velocity_to_msg
-from ros_3d_bb.core.params import ROBOT_FRAME, SET_BY_LAUNCH, TRACKS_TIMEOUT, Param, parameters
+from ros_3d_bb.core.params import CLASSES_FILE, ROBOT_FRAME, SET_BY_LAUNCH, TRACKS_TIMEOUT, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.latest_tracks import RobotTracks
@@ -30,6 +30,7 @@ class SpeedLimitParams(NamedTuple):
 
     robot_frame: str = ROBOT_FRAME
     timeout: float = TRACKS_TIMEOUT
+    classes_file: str = CLASSES_FILE
     use_scan: bool = Param(False, 'Whether the speed is limited before blind corners in the scan.',
                            section=SET_BY_LAUNCH)
 
@@ -38,11 +39,11 @@ class SpeedLimitNode(object):
     """Publish the highest safe speed among tracked people, and limit velocity commands to it.
 
     Each command on cmd_vel_in gives one on cmd_vel, with the same path. The speed is safe if the robot can stop before
-    it reaches a person, wherever the person will be until then, see `highest_safe_speed`. Without tracks for ~timeout,
-    or without the pose of the robot, the limit is 0, and rotations in place end, too. People who are not tracked,
-    such as those behind the camera, are unknown to the node. With ~use_scan, people who may come from behind a blind
-    corner count, too, see `speed_before_corners`; without scans for ~timeout, the limit is ~corner_speed. The node does
-    not publish by itself: the base must stop if it receives no commands. Parameters: config/speed_limit.yaml.
+    it reaches a person, wherever the person will be until then, see `highest_safe_speed`. Without tracks or a new pose
+    of the robot for ~timeout, the limit is 0, and rotations in place end, too. People who are not tracked, such as
+    those behind the camera, are unknown to the node. With ~use_scan, people who may come from behind a blind corner
+    count, too, see `speed_before_corners`; without scans for ~timeout, the limit is ~corner_speed. The node does not
+    publish by itself: the base must stop if it receives no commands. Parameters: config/speed_limit.yaml.
 
     Subscribes
     ----------
@@ -66,8 +67,7 @@ class SpeedLimitNode(object):
         self._diagnostics, self._velocity = Diagnostics(), AHEAD
         self._limit_pub = rospy.Publisher('~speed_limit', Float32, queue_size=1)
         self._velocity_pub = rospy.Publisher('cmd_vel', Twist, queue_size=1)
-        self._tracks = RobotTracks(self._diagnostics, self._params.timeout, self._params.robot_frame,
-                                   lambda _tracks: None)
+        self._tracks = RobotTracks(self._diagnostics, self._params, lambda _tracks: None)
         subscribe('cmd_vel_in', Twist, self._on_command, 1)
         if self._params.use_scan:
             subscribe('scan', LaserScan, self._on_scan, 1)
