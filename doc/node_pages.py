@@ -25,7 +25,7 @@ OWN_FILE = '# To change some, write them to a file of your own, and pass it as d
 LIVE = (' Those marked Live can be changed while the node runs,\n# as with rqt_reconfigure; the range is that of its '
         'sliders.')
 CLASSES_TEXT = 'Classes of objects. %s\n%s' % (MADE_CONFIG, """\
-Copy this file to change it, and set ~classes_file of bbox3d_node, tracker_node and planner_bridge_node to the copy.
+Copy this file to change it, and set ~classes_file of all nodes that have this parameter to the copy.
 Names are those of the detector. Lengths are in metres. The keys of a class, all of them optional, are
 
 group:         classes that detectors confuse: tracks never change between groups. Default: the class itself.

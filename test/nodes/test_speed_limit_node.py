@@ -4,9 +4,11 @@ The speeds themselves are in test/unit/test_safe_speed.py.
 """
 import time
 
+import numpy as np
 import pytest
 import rospy
 from geometry_msgs.msg import TransformStamped, Twist, Vector3
+from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float32
 from tf2_msgs.msg import TFMessage
 
@@ -17,6 +19,9 @@ from support.ros import Recorder, diagnostics_of, header_at, publisher, wait_unt
 
 LATENCY_NS, TIMEOUT_S = NS // 10, 0.5
 COMMAND = Twist(linear=Vector3(x=1.2), angular=Vector3(z=0.6))
+BEAMS = 181
+OPEN_M = np.full(BEAMS, np.inf)
+CORNER_M = np.where(np.arange(BEAMS) > 110, 1.5, np.inf)  # from 20 degrees on the left
 
 
 class Rig(object):
@@ -24,25 +29,28 @@ class Rig(object):
 
     def __init__(self):
         self._tracks, self._tf = publisher('ros_3d_bb/tracks', TrackedObjectArray), publisher('/tf', TFMessage)
-        self._commands = publisher('cmd_vel_in', Twist)
+        self._commands, self._scans = publisher('cmd_vel_in', Twist), publisher('front/scan', LaserScan)
         self.limits = Recorder('speed_limit_node/speed_limit', Float32)
         self.velocities = Recorder('cmd_vel', Twist)
 
-    def send(self, *positions):
-        """Standing people at positions (x, y) of the map."""
+    def send(self, *positions, ranges_m=OPEN_M):
+        """Standing people at positions (x, y) of the map, and a scan."""
         stamp_ns = rospy.get_rostime().to_nsec() - LATENCY_NS
         robot = TransformStamped(header=header_at(stamp_ns, 'map'), child_frame_id='base_link')
         robot.transform.translation.x, robot.transform.translation.y, robot.transform.rotation.w = 5.0, 1.0, 1.0
         self._tf.publish(TFMessage([robot]))
+        if ranges_m is not None:
+            self._scans.publish(LaserScan(header=header_at(stamp_ns, 'base_link'), angle_min=-np.pi / 2,
+                                          angle_increment=np.pi / 180, range_max=10.0, ranges=ranges_m.tolist()))
         self._tracks.publish(TrackedObjectArray(header=header_at(stamp_ns, 'map'), objects=[
             person(number, x, y, moving=False, speed=0.0) for number, (x, y) in enumerate(positions, 1)]))
 
-    def commanded(self, *positions):
+    def commanded(self, *positions, ranges_m=OPEN_M):
         """The last of a second of commands, among these people: linear, angular, and the last limit."""
         self.velocities.emptied()
         self.limits.emptied()
         for _command in range(10):
-            self.send(*positions)
+            self.send(*positions, ranges_m=ranges_m)
             self._commands.publish(COMMAND)
             time.sleep(0.1)
         velocities = self.velocities.wait_for(10)
@@ -75,6 +83,13 @@ def test_commands_are_limited_before_a_person_and_keep_their_path(rig):
     linear, angular, limit = rig.commanded((6.6, 1.4))
     assert 0.4 < linear < 1.1 and linear == pytest.approx(limit, abs=0.05) and angular == pytest.approx(linear / 2)
     assert diagnostics_of('speed_limit_node')[2]['commands limited'] >= 10
+
+
+def test_commands_are_limited_before_a_blind_corner_and_without_scans(rig):
+    assert rig.commanded((5.0, -6.0), ranges_m=CORNER_M)[0] == pytest.approx(0.3)
+    assert rig.commanded((5.0, -6.0), ranges_m=np.full(BEAMS, 1.5))[0] == pytest.approx(1.2)
+    assert rig.commanded((5.0, -6.0), ranges_m=None)[0] == pytest.approx(0.3)
+    assert diagnostics_of('speed_limit_node')[2]['no recent scan'] > 0
 
 
 def test_the_limit_is_zero_half_a_second_after_the_last_image(rig):

@@ -69,20 +69,32 @@ def ids(objects):
     return [track.id for track in objects]
 
 
+def low_camera(depth_m):
+    """A camera 0.2 m up, with the same depth everywhere."""
+    depth = DepthImage(np.full((480, 640), 1000 * depth_m, np.uint16), 0.001)
+    return CameraView(mounted(0.2), CAMERA, 'low', functools.partial(depths_towards, CAMERA, depth))
+
+
 @pytest.mark.parametrize('views', [('low',), ('low', 'left')])
 def test_a_person_before_a_low_camera_stays_while_the_place_is_occupied(views):
     """The detector finds the person in the first second only."""
     def cameras(depth_m):
-        depth = DepthImage(np.full((480, 640), 1000 * depth_m, np.uint16), 0.001)
-        low = CameraView(mounted(0.2), CAMERA, 'low', functools.partial(depths_towards, CAMERA, depth))
-        return [{'low': low, 'left': LEFT}[name] for name in views]
-    tracker, place_m = Tracker(), (1.0, 0.0)
-    play(tracker, images_of(1, lambda _time_s: place_m, cameras(0.95)))
+        return [{'low': low_camera(depth_m), 'left': LEFT}[name] for name in views]
+    tracker = Tracker()
+    play(tracker, images_of(1, lambda _time_s: (1.0, 0.0), cameras(0.95)))
     occupied = play(tracker, images_of(10, lambda _time_s: None, cameras(0.95), start_s=1))
     assert all([(track.id, track.status) for track in objects] == [(1, OCCLUDED)] for objects in occupied[len(views):])
     assert np.sqrt(occupied[-1][0].covariance[0, 0]) < 0.4
     free = play(tracker, images_of(1, lambda _time_s: None, cameras(4.0), start_s=11))
     assert free[-1] == []
+
+
+def test_a_wall_behind_a_person_who_has_left_does_not_keep_the_track_for_ever():
+    """The person stood 0.3 m before it. Afterwards the robot, which stands, sees only the wall."""
+    tracker, wall = Tracker(), [low_camera(1.3)]
+    play(tracker, images_of(1, lambda _time_s: (1.0, 0.0), wall))
+    left = play(tracker, images_of(45, lambda _time_s: None, wall, start_s=1)[::10])
+    assert all(ids(objects) == [1] for objects in left[:3 * 29]) and not any(left[3 * 36:])
 
 
 def test_a_person_who_walks_from_one_view_to_the_other_keeps_the_id():

@@ -14,16 +14,17 @@ from support.real_planners import planner_environment
 
 ARGUMENTS = ['scenario:=/some/scene.yaml', 'record:=/some/record.json']
 OPTIONS = argparse.Namespace(planner='dwa', detector='exact', rate=10.0)
-PIPELINE = {'ours': {'bbox3d_node', 'tracker_node'}, 'thesis': {'people_node'}}
+SEPARATE = {'bbox3d_node', 'tracker_node'}
+PIPELINE = {'ours': SEPARATE, 'limited': SEPARATE, 'thesis': {'people_node'}}
 
 
 @pytest.mark.parametrize('mode', MODES)
 def test_modes_differ_in_what_move_base_knows_of_people(mode):
     parameters, nodes = loaded('navigation_benchmark.launch', 'mode:=' + mode, *ARGUMENTS)
-    is_tracked = mode in ('ours', 'thesis')
+    is_tracked = mode in PIPELINE
     assert {'people_node', 'bbox3d_node', 'tracker_node'} & set(nodes) == PIPELINE.get(mode, set())
     assert parameters['/simulator_node/boxes'] == is_tracked
-    assert parameters.get('/tracker_node/tracker') == {'ours': 'kalman', 'thesis': 'thesis'}.get(mode)
+    assert (parameters.get('/tracker_node/tracker') == 'thesis') == (mode == 'thesis')
     assert (['ground_truth', 'ros_3d_bb/tracks'] in nodes['simulator_node'].remap_args) == (mode == 'truth')
     layers = [layer['name'] for layer in parameters['/move_base/local_costmap/plugins']]
     assert layers == ['static_layer'] + {
@@ -31,7 +32,9 @@ def test_modes_differ_in_what_move_base_knows_of_people(mode):
         'none': ['inflation_layer']}.get(mode, ['people_layer', 'prediction_layer'])
     assert parameters['/move_base/DWAPlannerROS/sum_scores'] == (mode not in ('depth', 'laser', 'none'))
     waits_for = [name for name in ('tracks', 'cloud', 'scan') if parameters['/navigation_trial_node/' + name]]
-    assert waits_for == {'depth': ['cloud'], 'laser': ['scan'], 'none': []}.get(mode, ['tracks'])
+    assert waits_for == {'depth': ['cloud'], 'laser': ['scan'], 'limited': ['tracks', 'scan'],
+                         'none': []}.get(mode, ['tracks'])
+    assert parameters.get('/speed_limit_node/use_scan') == (True if mode == 'limited' else None)
     assert parameters['/navigation_trial_node/visible'] == (mode == 'visible')
     assert parameters['/simulator_node/drive'] and parameters['/simulator_node/supervised']
 

@@ -75,10 +75,11 @@ class MessageCache(object):
             self._entries.popleft()
         return went_back
 
-    @property
-    def half_period_ns(self):
-        """`half_period_of` the cached values."""
-        return half_period_of([entry.stamp_ns for entry in list(self._entries)])
+    def matching(self, stamp_ns, tolerance_ns=0):
+        """The entry with this stamp, otherwise the nearest within the tolerance, or None. The tolerance 0 stands for
+        `half_period_of` the cached values."""
+        return self.nearest(stamp_ns) or self.nearest(
+            stamp_ns, tolerance_ns or half_period_of([entry.stamp_ns for entry in list(self._entries)]))
 
     def nearest(self, stamp_ns, tolerance_ns=0):
         """The entry with the nearest stamp within the tolerance, or None."""
@@ -116,7 +117,7 @@ class StampSynchronizer(object):
     length_ns : int
         How long images are kept, and how long boxes wait.
     tolerance_ns : int
-        Largest difference between the stamps of one frame; 0: `MessageCache.half_period_ns` of the depth images.
+        Largest difference between the stamps of one frame, see `MessageCache.matching`.
     assumed_delay_ns : int
         Latency of the detector, for boxes without a stamp; also an attribute.
     on_frame : callable
@@ -203,11 +204,10 @@ class StampSynchronizer(object):
             return
         settled, waiting = [], []
         newest_ns = self._depths.newest_ns
-        tolerance_ns = self._tolerance_ns or self._depths.half_period_ns
         is_tolerance_known = self._tolerance_ns > 0 or len(self._depths) > 1
         for number, entry in enumerate(self._waiting):
-            depth = self._depths.nearest(entry.stamp_ns, tolerance_ns)
-            camera = None if depth is None else self._camera_at(entry.stamp_ns, tolerance_ns)
+            depth = self._depths.matching(entry.stamp_ns, self._tolerance_ns)
+            camera = None if depth is None else self._camera_at(entry.stamp_ns)
             is_lost = depth is None and newest_ns is not None and entry.stamp_ns < newest_ns and is_tolerance_known
             is_late = now_ns - entry.arrival_ns > self._length_ns
             is_crowded = len(self._waiting) - number > MAX_WAITING
@@ -222,11 +222,11 @@ class StampSynchronizer(object):
             else:
                 self._on_frame(boxes, depth.value, camera)
 
-    def _camera_at(self, stamp_ns, tolerance_ns):
+    def _camera_at(self, stamp_ns):
         """The camera of the boxes, or the nearest one as soon as a newer message shows that its own is lost."""
         if self._plain_camera is not None:
             return self._plain_camera
-        camera = self._cameras.nearest(stamp_ns, tolerance_ns)
+        camera = self._cameras.matching(stamp_ns, self._tolerance_ns)
         if camera is None and max(self._depths.newest_ns, self._cameras.newest_ns or 0) > stamp_ns:
             camera = self._cameras.nearest(stamp_ns, float('inf'))
         return None if camera is None else camera.value

@@ -10,7 +10,7 @@ from std_srvs.srv import SetBool, SetBoolResponse
 
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.conversions.planner_msgs import pose_to_msg, velocity_to_msg
-from ros_3d_bb.core.params import ROBOT_FRAME, TRACKS_TIMEOUT, Param, parameters
+from ros_3d_bb.core.params import CLASSES_FILE, ROBOT_FRAME, TRACKS_TIMEOUT, Param, parameters
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.latest_tracks import RobotTracks
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
@@ -31,6 +31,7 @@ class FollowNodeParams(NamedTuple):
     enabled: bool = Param(False)
     robot_frame: str = ROBOT_FRAME
     timeout: float = TRACKS_TIMEOUT
+    classes_file: str = CLASSES_FILE
 
 
 class FollowNode(object):
@@ -42,8 +43,8 @@ class FollowNode(object):
     ~recover_within, it must be enabled again. The robot keeps a speed at which it can stop before all tracked people
     (`highest_safe_speed`). With ~output cmd_vel, it knows no obstacles other than people.
 
-    If the tracks stop for ~timeout, or the pose of the robot is unknown, one zero command is published at once, and
-    then nothing, as when the node is disabled or ends. With ~output goal, the goal is cancelled instead.
+    If there are no tracks or no new pose of the robot for ~timeout, one zero command is published at once, and then
+    nothing, as when the node is disabled or ends. With ~output goal, the goal is cancelled instead.
     Parameters: config/follow.yaml.
 
     Publishes
@@ -76,7 +77,7 @@ class FollowNode(object):
         self._target_pub.publish(UInt32(0))
         self._diagnostics.show('following', self._state)
         rospy.on_shutdown(lambda: self._on_enable(False))
-        self._tracks = RobotTracks(self._diagnostics, self._params.timeout, self._params.robot_frame, self._on_tracks)
+        self._tracks = RobotTracks(self._diagnostics, self._params, self._on_tracks)
         rospy.Service('~enable', SetBool, lambda request: self._on_enable(request.data))
         ReconfigureServer(given, self._reconfigure)
         self._timer = rospy.Timer(rospy.Duration.from_sec(PERIOD_S), self._on_timer, reset=True)

@@ -3,16 +3,22 @@ from typing import NamedTuple
 
 import rospy
 from geometry_msgs.msg import Twist
+from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float32
 
+from ros_3d_bb.camera.camera_model import transform_points
+from ros_3d_bb.conversions.perception_msgs import stamp_of
 from ros_3d_bb.conversions.planner_msgs import velocity_from_msg, velocity_to_msg
-from ros_3d_bb.core.params import ROBOT_FRAME, TRACKS_TIMEOUT, parameters
+from ros_3d_bb.core.params import CLASSES_FILE, ROBOT_FRAME, SET_BY_LAUNCH, TRACKS_TIMEOUT, Param, parameters
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.latest_tracks import RobotTracks
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import subscribe
-from ros_3d_bb.planning.safe_speed import SafeSpeedParams, highest_safe_speed, limited_velocity
+from ros_3d_bb.planning.blind_corners import blind_corners
+from ros_3d_bb.planning.safe_speed import (CornerParams, SafeSpeedParams, highest_safe_speed, limited_velocity,
+                                           speed_before_corners)
 
 PERIOD_S = 0.05  # between two limits; chosen: that of move_base's controller, and a tenth of the default timeout
 AHEAD = 0.0, 0.0, 0.0
@@ -24,21 +30,27 @@ class SpeedLimitParams(NamedTuple):
 
     robot_frame: str = ROBOT_FRAME
     timeout: float = TRACKS_TIMEOUT
+    classes_file: str = CLASSES_FILE
+    use_scan: bool = Param(False, 'Whether the speed is limited before blind corners in the scan.',
+                           section=SET_BY_LAUNCH)
 
 
 class SpeedLimitNode(object):
     """Publish the highest safe speed among tracked people, and limit velocity commands to it.
 
     Each command on cmd_vel_in gives one on cmd_vel, with the same path. The speed is safe if the robot can stop before
-    it reaches a person, wherever the person will be until then, see `highest_safe_speed`. Without tracks for ~timeout,
-    or without the pose of the robot, the limit is 0, and rotations in place end, too. People who are not tracked,
-    such as those behind the camera, are unknown to the node. It does not publish by itself: the base must stop if it
-    receives no commands. Parameters: config/speed_limit.yaml.
+    it reaches a person, wherever the person will be until then, see `highest_safe_speed`. Without tracks or a new pose
+    of the robot for ~timeout, the limit is 0, and rotations in place end, too. People who are not tracked, such as
+    those behind the camera, are unknown to the node. With ~use_scan, people who may come from behind a blind corner
+    count, too, see `speed_before_corners`; without scans for ~timeout, the limit is ~corner_speed. The node does not
+    publish by itself: the base must stop if it receives no commands. Parameters: config/speed_limit.yaml.
 
     Subscribes
     ----------
     cmd_vel_in : geometry_msgs/Twist
         Commands: velocity along x and y, and about z.
+    scan : sensor_msgs/LaserScan
+        Planar laser scan; only with ~use_scan.
 
     Publishes
     ---------
@@ -49,17 +61,30 @@ class SpeedLimitNode(object):
     """
 
     def __init__(self):
-        params, self._safety = given = read_params(SpeedLimitParams, SafeSpeedParams)
+        self._params, self._safety, self._corner_params = given = read_params(
+            SpeedLimitParams, SafeSpeedParams, CornerParams)
+        self._corners_m, self._scan_ns = (), 0
         self._diagnostics, self._velocity = Diagnostics(), AHEAD
         self._limit_pub = rospy.Publisher('~speed_limit', Float32, queue_size=1)
         self._velocity_pub = rospy.Publisher('cmd_vel', Twist, queue_size=1)
-        self._tracks = RobotTracks(self._diagnostics, params.timeout, params.robot_frame, lambda _tracks: None)
+        self._tracks = RobotTracks(self._diagnostics, self._params, lambda _tracks: None)
         subscribe('cmd_vel_in', Twist, self._on_command, 1)
+        if self._params.use_scan:
+            subscribe('scan', LaserScan, self._on_scan, 1)
         ReconfigureServer(given, self._reconfigure)
         self._timer = rospy.Timer(rospy.Duration.from_sec(PERIOD_S), self._on_timer, reset=True)
 
-    def _reconfigure(self, _params, safety):
-        self._safety = safety
+    def _reconfigure(self, _params, safety, corner_params):
+        self._safety, self._corner_params = safety, corner_params
+
+    def _on_scan(self, message):
+        with self._diagnostics.receiving('scans'):
+            limits_m = message.range_min, message.range_max
+            corners_m = blind_corners(message.ranges, limits_m, message.angle_min, message.angle_increment)
+            robot_from_laser = self._tracks.robot_from(message.header.frame_id)
+            if robot_from_laser is not None:
+                self._corners_m = transform_points(robot_from_laser, corners_m)[:, :2]
+                self._scan_ns = stamp_of(message)
 
     def _on_command(self, message):
         with self._diagnostics.receiving('commands'):
@@ -79,7 +104,15 @@ class SpeedLimitNode(object):
         if around is None:
             self._diagnostics.warn('no recent tracks', 'no recent tracks: the robot stands until there are some')
             return None
-        return highest_safe_speed(around.tracks, around.age_s, around.robot_from_tracks, velocity, self._safety)
+        limit = highest_safe_speed(around.tracks, around.age_s, around.robot_from_tracks, velocity, self._safety)
+        return min(limit, self._limit_before_corners(velocity)) if self._params.use_scan else limit
+
+    def _limit_before_corners(self, velocity):
+        age_s = (rospy.get_rostime().to_nsec() - self._scan_ns) / NS
+        if abs(age_s) > self._params.timeout:
+            self._diagnostics.warn('no recent scan', 'no recent scan: the limit is ~corner_speed until there is one')
+            return self._corner_params.corner_speed
+        return speed_before_corners(self._corners_m, max(age_s, 0.0), velocity, self._safety, self._corner_params)
 
 
 def main():

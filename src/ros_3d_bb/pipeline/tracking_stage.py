@@ -226,9 +226,7 @@ class TrackingStage(object):
     def _view(self, header, fixed_from_camera, camera, camera_name):
         """Return the CameraView of boxes with this header, with intrinsics and depth if they are known."""
         intrinsics, depth_at = self._intrinsics.get(camera), None
-        depths, stamp_ns = self._depths[camera], header.stamp.to_nsec()
-        entry = depths.nearest(stamp_ns) or depths.nearest(
-            stamp_ns, int(self._params.stamp_tolerance * NS) or depths.half_period_ns)
+        entry = self._depths[camera].matching(header.stamp.to_nsec(), int(self._params.stamp_tolerance * NS))
         if intrinsics is not None and entry is not None:
             depth_at = self._depth_at(*entry.value, intrinsics, camera, header.frame_id)
         return CameraView(fixed_from_camera, intrinsics, camera_name, depth_at)

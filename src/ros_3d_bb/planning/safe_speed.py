@@ -34,6 +34,18 @@ class SafeSpeedParams(NamedTuple):
         2.0, 'Limit where there are no people.', 'm/s', limits=(0.05, 10.0), live=(0.1, 3))
 
 
+@parameters('blind corners')
+class CornerParams(NamedTuple):
+    """Parameters of `speed_before_corners`."""
+
+    emerging_speed: float = Param(
+        1.4, 'Speed at which people may come from behind a blind corner; the default is the usual speed of walking.',
+        'm/s', limits=(0.0, 5.0), live=(0, 3))
+    corner_speed: float = Param(
+        0.3, 'Blind corners do not lower the limit further than to this, so that the robot can pass them.', 'm/s',
+        limits=(0.05, 10.0), live=(0.1, 1))
+
+
 def highest_safe_speed(tracks, age_s, robot_from_tracks, velocity, params):
     """Highest speed, m/s, from which the robot stops before the ellipses of all people in its way.
 
@@ -55,18 +67,27 @@ def highest_safe_speed(tracks, age_s, robot_from_tracks, velocity, params):
         linear velocity.
     params : SafeSpeedParams
     """
-    reaction_s, deceleration = params.reaction_time, params.deceleration
-    longest_s = reaction_s + params.highest_speed / deceleration
-    longest_m = params.highest_speed * (reaction_s + longest_s) / 2
-    ahead_s = np.arange(0, longest_s + TIME_STEP_S, TIME_STEP_S)
-    places_m = _path(velocity, np.arange(0, longest_m + 2 * PATH_STEP_M, PATH_STEP_M))
+    ahead_s, places_m = _times_and_places(velocity, params)
     speed_mps = params.highest_speed
     for track in tracks:
-        free_m = _free_distances(track, age_s + ahead_s, robot_from_tracks, places_m, params)
-        by_distance = np.sqrt((deceleration * reaction_s) ** 2 + 2 * deceleration * free_m) - deceleration * reaction_s
-        by_time = deceleration * (ahead_s - TIME_STEP_S - reaction_s)  # slower robots stand before the person is there
-        speed_mps = min(speed_mps, np.maximum(by_distance, by_time).min())
-    return float(speed_mps)
+        distances = _distances(track, age_s + ahead_s, robot_from_tracks, places_m, params)
+        speed_mps = min(speed_mps, _speed_before(distances, ahead_s, params))
+    return speed_mps
+
+
+def speed_before_corners(corners_m, age_s, velocity, params, corner_params):
+    """Highest speed, m/s, from which the robot stops before a person who comes from behind a blind corner.
+
+    As `highest_safe_speed`, with a circle around each corner (n, 2) in which the person may be, in the frame of the
+    robot `age_s` seconds ago. It is not less than `corner_speed`.
+    """
+    ahead_s, places_m = _times_and_places(velocity, params)
+    reaches_m = params.robot_radius + params.people_clearance + corner_params.emerging_speed * (age_s + ahead_s)
+    speed_mps = params.highest_speed
+    for corner_m in corners_m:
+        distances = np.linalg.norm(places_m - corner_m, axis=1) / reaches_m[:, np.newaxis]
+        speed_mps = min(speed_mps, _speed_before(distances, ahead_s, params))
+    return max(speed_mps, corner_params.corner_speed)
 
 
 def limited_velocity(velocity, limit):
@@ -76,6 +97,15 @@ def limited_velocity(velocity, limit):
     speed_mps = math.hypot(*velocity[:2])
     factor = limit / speed_mps if speed_mps > limit else 1.0
     return tuple([factor * part for part in velocity])
+
+
+def _times_and_places(velocity, params):
+    """Times (n,) until the robot stands, and places (m, 2) that it can reach until then, with steps of
+    `PATH_STEP_M`."""
+    longest_s = params.reaction_time + params.highest_speed / params.deceleration
+    longest_m = params.highest_speed * (params.reaction_time + longest_s) / 2
+    ahead_s = np.arange(0, longest_s + TIME_STEP_S, TIME_STEP_S)
+    return ahead_s, _path(velocity, np.arange(0, longest_m + 2 * PATH_STEP_M, PATH_STEP_M))
 
 
 def _path(velocity, lengths_m):
@@ -88,10 +118,8 @@ def _path(velocity, lengths_m):
     return lengths_m[:, np.newaxis] * along.dot([[cos, sin], [-sin, cos]])
 
 
-def _free_distances(track, ahead_s, robot_from_tracks, places_m, params):
-    """Distances (n,) along a path, places (m, 2) with steps of `PATH_STEP_M`, to the ellipses of a person at times
-    (n,); infinite where the path does not meet them.
-    """
+def _distances(track, ahead_s, robot_from_tracks, places_m, params):
+    """Distances (n, m) of places (m, 2) from the centre of a person at times (n,); 1: on the ellipse."""
     rotation, shift_m = robot_from_tracks[:2, :2], robot_from_tracks[:2, 3]
     centers_m = position_after(track, ahead_s)[:, :2].dot(rotation.T) + shift_m
     covariances_m2 = np.matmul(np.matmul(rotation, covariances_after(track, ahead_s)[:, :2, :2]), rotation.T)
@@ -99,7 +127,17 @@ def _free_distances(track, ahead_s, robot_from_tracks, places_m, params):
     radius_m = track.size_m[0] / 2 + params.robot_radius + params.people_clearance
     semi_axes_m = radius_m + params.position_sigmas * np.sqrt(np.maximum(variances_m2, 0))
     offsets_m = np.matmul(places_m - centers_m[:, np.newaxis], axes)
-    distances = np.linalg.norm(offsets_m / semi_axes_m[:, np.newaxis], axis=2)  # from the centre; 1: on the ellipse
+    return np.linalg.norm(offsets_m / semi_axes_m[:, np.newaxis], axis=2)
+
+
+def _speed_before(distances, ahead_s, params):
+    """Highest speed from which the robot stops before places that are occupied then: those with distances (n, m) of at
+    most 1 at times (n,) that decrease along its path.
+    """
     is_met = (distances <= 1) & (np.gradient(distances, axis=1) < 0)
     first = np.where(is_met.any(axis=1), is_met.argmax(axis=1), np.inf)
-    return np.maximum(first - 1, 0) * PATH_STEP_M
+    free_m = np.maximum(first - 1, 0) * PATH_STEP_M
+    reaction_s, deceleration = params.reaction_time, params.deceleration
+    by_distance = np.sqrt((deceleration * reaction_s) ** 2 + 2 * deceleration * free_m) - deceleration * reaction_s
+    by_time = deceleration * (ahead_s - TIME_STEP_S - reaction_s)  # slower robots stand before the person is there
+    return float(np.maximum(by_distance, by_time).min())

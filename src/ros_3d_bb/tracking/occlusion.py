@@ -29,6 +29,7 @@ STATUS = {VISIBLE: OCCLUDED, OCCLUDED: OCCLUDED, OUT_OF_VIEW: OUT_OF_VIEW, PRESE
 RECENT_NS = NS  # a camera whose latest image is older is ignored
 BEHIND_M = 0.45  # upper bound of the position's standard deviation of a person who stays behind an occluder
 PRESENT_M = 0.3  # the same of one whose place is occupied
+PRESENT_NS = 30 * NS  # without a detection for longer, what occupies the place may be a wall, which would stay for ever
 OCCLUDING_S = 0.3  # a track missed for longer does not occlude others
 
 
@@ -53,7 +54,8 @@ def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_p
     """Update undetected tracks in place: status, visibility, and the times for which they are unseen and missed.
 
     An occluded person who is predicted to reappear but is not detected is assumed to stay behind the occluder: the
-    track keeps its previous position. A person whose place is occupied does not become less certain than `PRESENT_M`.
+    track keeps its previous position. A person whose place is occupied does not become less certain than `PRESENT_M`,
+    until `PRESENT_NS` after the latest detection.
 
     `missed` are those of the `tracks` that are not detected; they are predicted to the stamp of the image. `before` are
     the tracks after the previous image. `cameras` maps each camera to its CameraState; `camera` is that of the image,
@@ -75,7 +77,7 @@ def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_p
     for track in missed:
         track.set_visibility(camera, seen[track.id])
         best = min([seen[track.id]] + [track.visibility.get(name, OUT_OF_VIEW) for name in others])
-        if best == PRESENT and not track.is_confirmed:
+        if best == PRESENT and not (track.is_confirmed and image.stamp_ns - track.last_ns <= PRESENT_NS):
             best = OUT_OF_VIEW
         if best == PRESENT:
             track.state = State(*(track.state[:4] + _bounded(track.state, before[track.id].state, PRESENT_M)))

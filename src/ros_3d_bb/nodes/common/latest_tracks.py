@@ -5,11 +5,12 @@ import rospy
 import tf2_ros
 
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, stamp_of, tracks_from_msg
+from ros_3d_bb.core.object_classes import read_object_classes
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.common.subscribers import subscribe
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
-from ros_3d_bb.planning.planner_view import usable_tracks
+from ros_3d_bb.planning.planner_view import usable_tracks, with_class_widths
 
 
 class Tracks(NamedTuple):
@@ -21,8 +22,8 @@ class Tracks(NamedTuple):
 
 
 class TracksAround(NamedTuple):
-    """Tracks with their stamp and frame, their age in seconds, and the current pose of their frame in that of the
-    robot, (4, 4)."""
+    """Tracks with at least the widths of their classes (`with_class_widths`), with their stamp and frame, their age in
+    seconds, and the current pose of their frame in that of the robot, (4, 4)."""
 
     tracks: list
     stamp_ns: int
@@ -64,7 +65,9 @@ class LatestTracks(object):
 
 
 class RobotTracks(LatestTracks):
-    """As LatestTracks, with the pose of the robot.
+    """As LatestTracks, with the pose of the robot, to which the same timeout applies.
+
+    The parameters `params` are `timeout`, `robot_frame` and `classes_file`.
 
     Subscribes
     ----------
@@ -76,22 +79,38 @@ class RobotTracks(LatestTracks):
         As /tf.
     """
 
-    def __init__(self, diagnostics, timeout_s, robot_frame, on_tracks):
-        if not robot_frame:
+    def __init__(self, diagnostics, params, on_tracks):
+        if not params.robot_frame:
             raise ValueError('parameter ~robot_frame is empty; a frame such as base_link expected')
-        self._robot_frame, self._transforms = robot_frame, Transforms(wait_s=0)
+        self._classes = read_object_classes(params.classes_file)
+        self._robot_frame, self._transforms = params.robot_frame, Transforms(wait_s=0)
         diagnostics.show('tf age', self._transforms.age)
-        super(RobotTracks, self).__init__(diagnostics, timeout_s, on_tracks)
+        super(RobotTracks, self).__init__(diagnostics, params.timeout, on_tracks)
 
     def around(self):
-        """Return TracksAround, None if the tracks are too old or the pose is unknown."""
+        """Return TracksAround, None if the tracks or the pose are older than the timeout, or the pose is unknown."""
         newest, age_s = self.newest()
         if newest is None:
             return None
-        try:
-            robot_from_tracks = self._transforms.latest(self._robot_frame, newest.frame_id)
-        except tf2_ros.TransformException as error:
-            self._diagnostics.warn('no transform', 'no transform from %s to %s: %s; the robot stands until there is one'
-                                   % (newest.frame_id, self._robot_frame, error))
+        robot_from_tracks = self.robot_from(newest.frame_id)
+        if robot_from_tracks is None:
             return None
-        return TracksAround(*newest, age_s=age_s, robot_from_tracks=robot_from_tracks)
+        tracks = with_class_widths(newest.tracks, self._classes)
+        return TracksAround(tracks, newest.stamp_ns, newest.frame_id, age_s, robot_from_tracks)
+
+    def robot_from(self, frame_id):
+        """Return the current pose of a frame in that of the robot, (4, 4); None if it is unknown, or older than the
+        timeout."""
+        try:
+            robot_from_frame = self._transforms.latest(self._robot_frame, frame_id)
+            age_s = self._transforms.age_of_latest(self._robot_frame, frame_id)
+        except tf2_ros.TransformException as error:
+            self._diagnostics.warn('no transform', 'no transform from %s to %s: %s; waiting for it'
+                                   % (frame_id, self._robot_frame, error))
+            return None
+        if age_s > self._timeout_s:
+            self._diagnostics.warn('old transform', 'the latest transform from %s to %s is %.1f s old, more than '
+                                   '~timeout (%g s); waiting for a newer one'
+                                   % (frame_id, self._robot_frame, age_s, self._timeout_s))
+            return None
+        return robot_from_frame

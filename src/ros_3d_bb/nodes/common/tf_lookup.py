@@ -74,6 +74,13 @@ class Transforms(object):
         self._buffer.forget_later(target_frame, source_frame)
         return self.lookup(target_frame, source_frame, rospy.Time())
 
+    def age_of_latest(self, target_frame, source_frame):
+        """Age of what `latest` returns, seconds; 0 if only static transforms are between the frames. Raises
+        tf2_ros.TransformException."""
+        frames = target_frame.lstrip('/'), source_frame.lstrip('/')
+        newest = self._buffer.get_latest_common_time(*frames)
+        return max((rospy.get_rostime() - newest).to_sec(), 0.0) if newest and frames[0] != frames[1] else 0.0
+
     def link_to_root(self, target_frame, frame, target_from_frame):
         """As `TransformBuffer.link_to_root`."""
         return self._buffer.link_to_root(target_frame, frame, target_from_frame)

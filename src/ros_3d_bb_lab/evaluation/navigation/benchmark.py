@@ -15,7 +15,7 @@ from ros_3d_bb_lab.evaluation.launching import launch
 from ros_3d_bb_lab.evaluation.navigation.navigation_scenes import CAMERAS, GOAL_M, RATE_HZ, SCENES, scenario_of
 from ros_3d_bb_lab.evaluation.navigation.trial_result import summaries
 
-MODES = 'ours', 'none', 'laser', 'depth', 'thesis', 'visible', 'truth'
+MODES = 'ours', 'limited', 'none', 'laser', 'depth', 'thesis', 'visible', 'truth'
 PLANNERS = 'dwa', 'teb'
 TRUE_BOXES = 'exact'
 TRIAL_TIMEOUT_S = 900.0
@@ -107,7 +107,7 @@ def _arguments():
                         help='some of %s' % ', '.join(MODES))
     parser.add_argument('--planner', choices=PLANNERS, default='dwa', help='local planner (default: dwa)')
     parser.add_argument('--detector', default=TRUE_BOXES, metavar='exact|depth|FILE',
-                        help='2D boxes of the modes ours and thesis: true ones with a jitter of 1 pixel; '
+                        help='2D boxes of the modes ours, limited and thesis: true ones with a jitter of 1 pixel; '
                         'depth_detector_node; yolov5_node with these weights (default: exact)')
     parser.add_argument('--rate', type=float, default=RATE_HZ, metavar='HZ',
                         help='images per second of each camera (default: %g)' % RATE_HZ)
