@@ -24,7 +24,7 @@ NODES = {node.name: node for node in node_pages.nodes()}
 SCENARIO = os.path.join(ROOT, 'config', 'scenarios', 'empty_room.yaml')
 # Parameters with which nodes connect to all their topics; the other nodes are created as by the fuzzer.
 MORE_PARAMS = {'planner_bridge_node': {'outputs': 'costmap, people, teb, mpc, vision'},
-               'tracker_node': {'use_map': True},
+               'tracker_node': {'use_map': True}, 'speed_limit_node': {'use_scan': True},
                'realsense_node': {'publish_clock': True}, 'replay_node': {'boxes': True},
                'navigation_trial_node': dict(scenario=SCENARIO, tracks=True, boxes=True, cloud=True, visible=True,
                                              scan=True),
