@@ -56,9 +56,10 @@ class MeasurementTable(NamedTuple):
         return tuple(outlier for outlier in found if outlier is not None)
 
     def without(self, outliers):
-        """Select the measurements that are not among the outliers."""
-        names = set(outlier.name for outlier in outliers)
-        return self._part(np.array([name not in names for name in self.ids]))
+        """Select the measurements that are not among the outliers. Others of the same image remain."""
+        found = set((outlier.name, *outlier.truth_m.tolist()) for outlier in outliers)
+        return self._part(np.array([(name, *truth_m) not in found
+                                    for name, truth_m in zip(self.ids, self.truth_m.tolist())]))
 
     def _is_complete(self):
         return np.isfinite(np.concatenate((self.measured_m[:, [0, 2]], self.truth_m), axis=1)).all(axis=1)
