@@ -105,11 +105,13 @@ def test_without_an_invertible_bias_no_model_of_an_earlier_analysis_remains(out,
 
 
 def test_a_mean_error_above_the_standard_deviation_is_named_at_any_range(tmp_path, monkeypatch):
-    rows = [[x + error, x, z + bias + scale * error, z] for z, bias, scale in ((1500, 25, 1), (2000, 30, 20), (3000, 30, 20))
+    places = (1500, 25, 1), (2000, 30, 20), (3000, 30, 20)
+    rows = [[x + error, x, z + bias + scale * error, z] for z, bias, scale in places
             for x in (-500, 0, 500) for error in (-2, 0, 2)]
     table = write_table(tmp_path / 'table.csv', rows, COLUMNS[:4])
     run(monkeypatch, '--z', table, '--x', table, '--out', tmp_path / 'out')
-    assert 'At Z = 1.50 m the mean error in Z is +0.025 m' in (tmp_path / 'out' / 'report.html').read_text(encoding='utf-8')
+    page = (tmp_path / 'out' / 'report.html').read_text(encoding='utf-8')
+    assert 'At Z = 1.50 m the mean error in Z is +0.025 m' in page
 
 
 def test_what_was_left_out_is_listed_and_does_not_prevent_the_analysis(tmp_path, monkeypatch, capsys):

@@ -43,7 +43,7 @@ class Window(object):
         cv2.imshow(self._title, np.ascontiguousarray(picture[..., ::-1]))
 
     def key(self, wait_ms):
-        """Wait for a key up to `wait_ms`. Returns its character, or '' if no key is pressed, or one without a character.
+        """Wait for a key up to `wait_ms`. Returns its character, or '' if it has none, or no key is pressed.
 
         If several keys were pressed since the last call, OpenCV's Qt windows return the last one and drop the others.
         Letters are lower case there.

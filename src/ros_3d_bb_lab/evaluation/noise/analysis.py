@@ -69,7 +69,6 @@ class Analysis(NamedTuple):
         """Pairs (axis, ClusterStatistics) of the clusters that the variances are computed from."""
         return [(name, cluster) for name, axis in (('Z', self.z), ('X', self.x_variance)) for cluster in axis.clusters]
 
-
     @property
     def model_note(self):
         """Why there is no cross-validated error model, and what error_model.yaml is instead; '' if there is one."""

@@ -76,8 +76,8 @@ def _bias_text(analysis):
     if not biased:
         return 'The mean error in Z nowhere exceeds the standard deviation.'
     far = max(biased, key=lambda cluster: abs(cluster.mean_m))
-    return ('At Z = %.2f m the mean error in Z is %+.3f m, %.1f times the standard deviation there: inflating obstacles '
-            'by σ alone does not cover it.%s' % (
+    return ('At Z = %.2f m the mean error in Z is %+.3f m, %.1f times the standard deviation there: inflating '
+            'obstacles by σ alone does not cover it.%s' % (
                 far.truth_m, far.mean_m, abs(far.mean_m) / max(far.sigma_m, 1e-6),
                 '' if analysis.model is None and analysis.thesis_form is None
                 else ' The error model corrects the mean error.'))
