@@ -5,7 +5,8 @@ from typing import Any, NamedTuple, Tuple
 
 import numpy as np
 
-from ros_3d_bb_annotator.export import RECORDED, default_estimator
+from ros_3d_bb.estimation.error_model import RECORDED
+from ros_3d_bb_annotator.export import default_estimator
 from ros_3d_bb_annotator.measurement import ANNOTATED
 from ros_3d_bb_lab.evaluation.noise.analysis import Inputs, analyse as analyse_noise
 from ros_3d_bb_lab.evaluation.noise.report import text_of, write_results

@@ -13,6 +13,7 @@ import numpy as np
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import plausible, truncated_edges
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
+from ros_3d_bb.estimation.error_model import RECORDED
 from ros_3d_bb.sessions.plausibility import likely_errors, outlier_of
 from ros_3d_bb.sessions.session_reader import SessionError, annotated_people, read_depth, read_session
 
@@ -162,7 +163,7 @@ def _dates_of(frames):
 
 def _estimate(frame, session, name):
     """Position (3,) of the annotated person of a frame, whose box is the first one, or None."""
-    if name == 'recorded':
+    if name == RECORDED:
         return frame.estimate_m
     boxes = estimate_boxes(read_depth(frame, session), frame.boxes_px, session.camera, estimator_named(name))
     return boxes[0].center_m if boxes and plausible(boxes[0]) else None
