@@ -31,6 +31,13 @@ def test_rows_with_faults_are_named(tmp_path, row, reason):
     assert 'table.csv' in str(error.value) and reason in str(error.value)
 
 
+@pytest.mark.parametrize('axis', 'XZ')
+def test_a_table_in_metres_is_rejected(tmp_path, axis):
+    path = write_table(tmp_path / 'table.csv', [[-1.152, -1.23, 2.558, 2.7], [0.1, 0, 1.4, 1.5]])
+    with pytest.raises(ValueError, match='table.csv: "%s true" is .* seem to be metres' % axis):
+        read_table(path, axis)
+
+
 @pytest.mark.parametrize('content,reason', [
     (b'X measured,X true,Z measured\n', 'no column "Z true"; there are: X measured'), (b'\n', 'there are: none'),
     (b'\x89PNG\xff\xfe', 'cannot be read'), (None, 'No such file'), (b'Z measured,Z true\n', 'without rows')])

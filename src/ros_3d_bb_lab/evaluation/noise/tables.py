@@ -19,6 +19,7 @@ from ros_3d_bb.sessions.session_reader import SessionError, annotated_people, re
 
 AXES = ('X', 'Z')
 LEAST_IN_CLUSTER = 3
+LEAST_EXTENT_M = 0.05  # tables of less are in metres
 ROUNDING_MM = 1.01  # errors may have been computed before the values were rounded
 
 
@@ -125,6 +126,10 @@ def read_table(path, axis):
     if not rows:
         raise ValueError('%s: a table without rows' % path)
     values_m = np.array(rows).reshape(-1, 2, 2) / 1000  # row, axis, (measured, true)
+    extent_m = np.abs(np.nan_to_num(values_m[:, AXES.index(axis), 1])).max()
+    if 0 < extent_m < LEAST_EXTENT_M:
+        raise ValueError('%s: "%s true" is %g mm at most; the values seem to be metres, and millimetres are expected'
+                         % (path, axis, 1000 * extent_m))
     measured_m = np.stack((values_m[:, 0, 0], np.zeros(len(rows)), values_m[:, 1, 0]), axis=1)
     return MeasurementTable(path, measured_m, values_m[:, :, 1], np.zeros(len(rows), bool), tuple(lines))
 
