@@ -5,7 +5,8 @@ from typing import Any, NamedTuple, Tuple
 
 import numpy as np
 
-from ros_3d_bb_annotator.export import RECORDED, default_estimator
+from ros_3d_bb.estimation.error_model import RECORDED
+from ros_3d_bb_annotator.export import default_estimator
 from ros_3d_bb_annotator.measurement import ANNOTATED
 from ros_3d_bb_lab.evaluation.noise.analysis import Inputs, analyse as analyse_noise
 from ros_3d_bb_lab.evaluation.noise.report import text_of, write_results
@@ -15,14 +16,14 @@ from ros_3d_bb_lab.evaluation.noise.tables import MeasurementTable, read_session
 class Analysed(NamedTuple):
     """Results of an analysis.
 
-    `text` contains mean error and spread of both axes. `no_model` is the reason why there is no cross-validated error
-    model, or empty. `outliers` were left out.
+    `text` contains mean error and spread of both axes. `model_note` is why there is no cross-validated error
+    model, and what there is instead, or empty. `outliers` were left out.
     """
 
     folder: str
     report_path: str
     text: str
-    no_model: str
+    model_note: str
     outliers: Tuple[Any, ...]
 
 
@@ -39,7 +40,7 @@ def analyse(document, folder=None, estimator=None):
                     else read_session_measurements(document.folder, estimator))
     analysis = analyse_noise(Inputs.of_session(measurements, estimator, 'unknown'))
     write_results(folder, analysis)
-    return Analysed(str(folder), str(folder / 'report.html'), text_of(analysis), analysis.no_model,
+    return Analysed(str(folder), str(folder / 'report.html'), text_of(analysis), analysis.model_note,
                     analysis.inputs.outliers)
 
 

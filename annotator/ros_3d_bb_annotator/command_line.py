@@ -45,8 +45,8 @@ def _analyse(document, arguments):
     for outlier in analysed.outliers:
         print('annotator: left out of the analysis:', outlier, file=sys.stderr)
     print(analysed.text)
-    if analysed.no_model:
-        print('annotator: note: no cross-validated error model: %s' % analysed.no_model, file=sys.stderr)
+    if analysed.model_note:
+        print('annotator: note: %s' % analysed.model_note, file=sys.stderr)
     print('report: %s' % analysed.report_path)
 
 

@@ -7,11 +7,11 @@ import io
 import os
 
 from ros_3d_bb.core.atomic_file import atomic_write
+from ros_3d_bb.estimation.error_model import RECORDED
 from ros_3d_bb.sessions.session_reader import SessionError
 from ros_3d_bb_annotator.document import ESTIMATOR
 from ros_3d_bb_annotator.measurement import ANNOTATED
 
-RECORDED = 'recorded'
 AXES = 'XYZ'
 COLUMNS = (('id', 'label', 'stamp', 'x1', 'y1', 'x2', 'y2', 'estimator')
            + tuple('%s %s' % (axis, kind) for kind in ('measured', 'recorded', 'true', 'error') for axis in AXES)

@@ -4,7 +4,8 @@ import re
 from ros_3d_bb_annotator.lengths import parse_length
 from ros_3d_bb_annotator.measurement import Mark
 
-HEADER = re.compile(r'\s*"?(name|mark|label)\b', re.IGNORECASE)
+HEADER = re.compile(r'(name|mark|label)\b', re.IGNORECASE)
+LEAST_Z_M = 0.05  # nobody stands nearer; probably metres without a unit
 
 
 def mark_of(name, x, z, where):
@@ -17,6 +18,9 @@ def mark_of(name, x, z, where):
         raise ValueError('%s: %s' % (where, error))
     if not mark.z_m > 0:
         raise ValueError('%s: Z is %s; more than 0 expected, as the camera looks along Z' % (where, z.strip()))
+    if mark.z_m < LEAST_Z_M:
+        raise ValueError('%s: Z is %s, %g mm; at least %g mm expected. Check the unit'
+                         % (where, z.strip(), 1000 * mark.z_m, 1000 * LEAST_Z_M))
     return mark
 
 
@@ -33,10 +37,12 @@ def parse_marks(text):
     """Marks of a table as text: a CSV file, or cells of a spreadsheet. A header is skipped. Raises ValueError."""
     marks = []
     for number, line in enumerate(text.splitlines(), 1):
-        if not line.strip() or (not marks and HEADER.match(line)):
+        if not line.strip():
             continue
         separator = next((one for one in ('\t', ';', ',') if line.count(one) >= 2), None)
         cells = [cell.strip().strip('"') for cell in line.split(separator)]
+        if not marks and HEADER.match(cells[0]) and not re.search('[0-9]', ''.join(cells[1:])):
+            continue  # a header, not a mark such as "Mark 1"
         if len(cells) != 3:
             raise ValueError('line %d is %.60r; name, X and Z expected, such as A1, -600, 1500' % (number, line))
         marks.append(mark_of(*cells, where='line %d' % number))

@@ -87,7 +87,9 @@ class Results(QtCore.QObject):
 
     def _on_analysed(self, analysed):
         self.analysed = analysed
-        self._window.statusBar().showMessage('Report, figures and error model are in %s' % analysed.folder)
+        self._window.statusBar().showMessage(
+            'Report and figures are in %s; %s' % (analysed.folder, analysed.model_note) if analysed.model_note
+            else 'Report, figures and error model are in %s' % analysed.folder)
         QtGui.QDesktopServices.openUrl(QtCore.QUrl.fromLocalFile(analysed.report_path))
 
 

@@ -210,7 +210,7 @@ def test_keys_store_pause_and_quit(rig, window):
     wait_until(stored, 'a measurement')
     check_stored(folder, sent, 0)
     assert entries(folder)[0].label == 'by hand' and len(entries(folder)) == 1
-    for key in ('l', 'b', '7', 'Return'):
+    for key in ('l', 'Shift_L', 'b', 'Left', '7', 'Num_Lock', 'KP_Enter'):  # only b and 7 are characters
         press_key(key)
         rospy.sleep(0.3)
     assert rospy.get_param('window/label') == 'b7'

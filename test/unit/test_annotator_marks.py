@@ -14,10 +14,17 @@ def test_tables_are_parsed(text):
     assert parse_marks(text) == MARKS
 
 
+def test_marks_whose_names_begin_as_a_header_are_kept():
+    marks = parse_marks('Name;X;Z\nMark 1;-600;1500\nLabel B;0;1500')
+    assert marks == parse_marks('Mark 1;-600;1500\nLabel B;0;1500')
+    assert [mark.name for mark in marks] == ['Mark 1', 'Label B']
+
+
 @pytest.mark.parametrize('text,named', [
     ('A1, -600', 'line 1 is'), ('A1, -600, 1500\nB1, far, 1500', "line 2: 'far' is not a length"),
     ('A1, -600, -1500', 'line 1: Z is -1500; more than 0'), ('A1, 0, 0', 'more than 0'),
     ('A1, 0, 900000', 'at most 100 m'),
+    ('Name, X [m], Z [m]\nA1, -0.6, 1.5', 'line 2: Z is 1.5, 1.5 mm; at least 50 mm expected'),
     (', 0, 1500', 'the name is empty'), ('A1, 0, 1500\na1, 0, 2000', 'a1 is not unique'), ('A1, nan, 1500', 'nan')])
 def test_invalid_tables_are_rejected(text, named):
     with pytest.raises(ValueError, match=named):

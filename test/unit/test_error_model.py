@@ -166,6 +166,11 @@ def test_the_thesis_model_is_the_published_one():
     assert np.sqrt(np.diag(model.covariance([0.5, 0, 2])))[[0, 2]] == pytest.approx([0.018, 0.0474])
 
 
+@pytest.mark.parametrize('estimator', ['', 'recorded', 'foreground'])
+def test_a_model_of_recorded_positions_is_for_any_estimator(estimator):
+    MODEL._replace(provenance=MODEL.provenance._replace(estimator=estimator)).check_estimator('foreground')
+
+
 def test_corrected_positions_are_in_front_of_the_camera():
     corrected_m = MODEL._replace(z_bias=(0.3,)).corrected([[0.0, 0.2, 0.1]])
     assert corrected_m[0, 2] > 0 and corrected_m[0, 1] > 0

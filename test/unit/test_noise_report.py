@@ -8,6 +8,7 @@ import datetime
 import json
 import os
 import re
+import shutil
 import sys
 
 import cv2
@@ -18,7 +19,7 @@ import conftest
 from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb_lab.evaluation.noise import __main__ as command
-from support.noise_tables import rows_of, write_table
+from support.noise_tables import COLUMNS, rows_of, write_table
 from support.small_session import change_json
 from support.synthetic_session import write_synthetic_session
 
@@ -88,6 +89,29 @@ def test_a_session_is_analysed_in_the_same_way(session_folder, tmp_path, monkeyp
     camera = read_session(session_folder).camera
     assert 'fx %.2f, fy %.2f' % camera[2:4] in page and 'leave-one-position-out' in page
     assert datetime.date.today().isoformat() in page
+
+
+def test_without_an_invertible_bias_no_model_of_an_earlier_analysis_remains(out, tmp_path, monkeypatch, capsys):
+    shutil.copy(str(out / 'error_model.yaml'), str(tmp_path))
+    rows = [[x, x, 0.3 * z + 600 + 5 * number, z] for z in (1500, 2000, 3000, 4000) for x in (-500, 0, 500)
+            for number in range(3)]
+    table = write_table(tmp_path / 'steep.csv', rows, COLUMNS[:4])
+    run(monkeypatch, '--z', table, '--x', table, '--out', tmp_path)
+    assert not list(tmp_path.glob('*.yaml'))
+    note = 'no cross-validated error model: z_bias changes by 0.7 m a metre'
+    assert note in capsys.readouterr().err
+    page = (tmp_path / 'report.html').read_text(encoding='utf-8')
+    assert 'no error_model.yaml is written' in page and 'The error model corrects' not in page
+
+
+def test_a_mean_error_above_the_standard_deviation_is_named_at_any_range(tmp_path, monkeypatch):
+    places = (1500, 25, 1), (2000, 30, 20), (3000, 30, 20)
+    rows = [[x + error, x, z + bias + scale * error, z] for z, bias, scale in places
+            for x in (-500, 0, 500) for error in (-2, 0, 2)]
+    table = write_table(tmp_path / 'table.csv', rows, COLUMNS[:4])
+    run(monkeypatch, '--z', table, '--x', table, '--out', tmp_path / 'out')
+    page = (tmp_path / 'out' / 'report.html').read_text(encoding='utf-8')
+    assert 'At Z = 1.50 m the mean error in Z is +0.025 m' in page
 
 
 def test_what_was_left_out_is_listed_and_does_not_prevent_the_analysis(tmp_path, monkeypatch, capsys):

@@ -5,6 +5,7 @@ import pytest
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb_lab.evaluation.noise.tables import read_session_measurements, read_table
 from support.noise_tables import write_table
+from support.small_session import change_json, write_small_session
 
 
 def test_reads_a_table_in_metres(tmp_path):
@@ -30,6 +31,13 @@ def test_rows_with_faults_are_named(tmp_path, row, reason):
     assert 'table.csv' in str(error.value) and reason in str(error.value)
 
 
+@pytest.mark.parametrize('axis', 'XZ')
+def test_a_table_in_metres_is_rejected(tmp_path, axis):
+    path = write_table(tmp_path / 'table.csv', [[-1.152, -1.23, 2.558, 2.7], [0.1, 0, 1.4, 1.5]])
+    with pytest.raises(ValueError, match='table.csv: "%s true" is .* seem to be metres' % axis):
+        read_table(path, axis)
+
+
 @pytest.mark.parametrize('content,reason', [
     (b'X measured,X true,Z measured\n', 'no column "Z true"; there are: X measured'), (b'\n', 'there are: none'),
     (b'\x89PNG\xff\xfe', 'cannot be read'), (None, 'No such file'), (b'Z measured,Z true\n', 'without rows')])
@@ -38,6 +46,20 @@ def test_files_that_are_not_tables_are_rejected(tmp_path, content, reason):
         (tmp_path / 'table.csv').write_bytes(content)
     with pytest.raises(ValueError, match='table.csv.*' + reason):
         read_table(str(tmp_path / 'table.csv'), 'Z')
+
+
+def test_an_outlier_does_not_remove_the_other_person_of_its_image(tmp_path):
+    folder = write_small_session(str(tmp_path), count=8)
+
+    def annotate(content):
+        for entry in content['frames']:
+            entry['truth_mm'], entry['detections'][1]['truth_mm'] = {'x': -470, 'z': 2000}, {'x': 700, 'z': 3000}
+        content['frames'][3]['detections'][1]['truth_mm']['z'] = 300
+    change_json(folder, annotate)
+    table = read_session_measurements(folder, 'recorded')
+    plausible = table.without(table.outliers())
+    assert len(table.ids) == 16 and plausible.ids.count('m3 (by the door)') == 1
+    assert sorted(plausible.truth_m[:, 1].tolist()) == 8 * [2.0] + 7 * [3.0]
 
 
 @pytest.mark.slow

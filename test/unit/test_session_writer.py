@@ -116,6 +116,15 @@ def test_invalid_measurements_and_those_of_another_camera_are_rejected(folder, c
     assert re.search(named, append_error(folder, measurement(1, **changes)))
 
 
+@pytest.mark.parametrize('content', [b'', b'{"camera": {', b'{"label": "\xe4"}'])
+def test_a_damaged_description_is_named_and_kept(folder, content):
+    append(folder, measurement(0))
+    path = os.path.join(folder, 'frames.json')
+    with open(path, 'wb') as stream:
+        stream.write(content)
+    assert append_error(folder, measurement(1)).startswith(path + ': not the description of a measurement session (')
+
+
 @pytest.mark.parametrize('full_at', ['color', 'depth', 'frames.json'])
 def test_a_full_disk_does_not_change_the_session(folder, monkeypatch, full_at):
     append(folder, measurement(0))

@@ -40,8 +40,9 @@ def test_each_person_is_one_track_in_both_views(bags):
     with rosbag.Bag(bags[1]) as bag:
         recording = read_recording(bag)
     assert len(recording.moments) == recording.answered == 39
-    result = score(recording.moments)
+    result = score(recording.moments, recording.cameras)
     for person in result.people:
+        assert person.visible_s > 2.5, person  # the first one in every second image
         assert len(person.ids) == 1 and person.rmse_m < 0.25, person
     assert result.false_share == 0
     last = recording.moments[-1]

@@ -66,6 +66,14 @@ def test_the_command_prints_the_table_and_writes_the_image_next_to_the_bag(bag):
     assert '<td>0.200 m</td>' in page and 'src="data:image/png;base64,' in page and 'http' not in page
 
 
+def test_a_picture_without_a_suffix_is_a_png_and_a_missing_table_is_named(bag, tmp_path, monkeypatch):
+    table = str(tmp_path / 'no such folder' / 'table.csv')
+    monkeypatch.setattr('sys.argv', ['scene_report', bag, str(tmp_path / 'picture'), '--csv', table])
+    with pytest.raises(SystemExit, match='no table was written'):
+        main()
+    assert sorted(os.listdir(str(tmp_path))) == ['picture.html', 'picture.png']
+
+
 def test_without_ground_truth_the_tracks_are_listed(tmp_path):
     path = str(tmp_path / 'tracked.bag')
     write_bag(((stamp_ns, [pair for pair in messages if pair[0] != 'ground_truth'])
@@ -94,16 +102,24 @@ def test_an_image_that_cannot_be_written_is_an_error(bag, tmp_path, picture):
         write_report(bag, str(tmp_path / picture))
 
 
+def write_unindexed(path):
+    """Write a bag whose recording was interrupted."""
+    write_bag(images_with_tracks('map'), path)
+    with open(path, 'r+b') as stream:
+        stream.truncate(os.path.getsize(path) // 2)
+
+
 @pytest.mark.parametrize('make, reason', [
     (lambda path: write_bag(scenario_images(scenario_from(SCENE)), path), 'no messages on /ros_3d_bb/tracks'),
     (lambda path: write_bag([(START_NS, [('ros_3d_bb/bb_3d', Header())])], path), 'but 3D boxes: probably tf lacks'),
     (lambda path: write_bag(images_with_tracks('odom'), path), 'frames map, odom'),
-    (lambda path: open(path, 'w').write('not a bag'), ''), (lambda _path: None, 'No such file')])
+    (lambda path: open(path, 'w').write('not a bag'), ''), (lambda _path: None, 'No such file'),
+    (write_unindexed, 'rosbag reindex')])
 def test_unusable_bags_are_rejected(tmp_path, monkeypatch, make, reason):
     path = str(tmp_path / 'some.bag')
     make(path)
     monkeypatch.setattr('sys.argv', ['scene_report', path])
-    with pytest.raises(SystemExit, match='%s: .*%s.*no report was written' % (re.escape(path), reason)):
+    with pytest.raises(SystemExit, match='%s.*%s.*no report was written' % (re.escape(path), reason)):
         main()
     assert set(os.listdir(str(tmp_path))) <= {'some.bag'}
 

@@ -63,7 +63,10 @@ def _read(path):
     if not os.path.exists(path):
         return {'frames': []}
     with open(path, encoding='utf-8') as stream:
-        content = json.load(stream)
+        try:
+            content = json.load(stream)
+        except ValueError as error:
+            raise ValueError('%s: not the description of a measurement session (%s)' % (path, error))
     if not isinstance(content, dict) or not isinstance(content.get('frames'), list):
         raise ValueError('%s: not the description of a measurement session; an object with frames expected' % path)
     return content

@@ -19,6 +19,7 @@ from ros_3d_bb.core.yaml_loader import load_yaml
 
 STEEPEST_BIAS, SOLVER_STEPS = 0.5, 20  # m/m; chosen: each step at least halves the remaining error, 1 m to 1 µm
 NEAREST_SHARE = 0.2  # lower bound of a corrected range, relative to the measured range; chosen
+RECORDED = 'recorded'  # estimator of models that are fitted to the positions stored in a session
 UNCALIBRATED_SIGMA_M = 0.1  # of positions without an error model; chosen
 # Additional standard deviations along x and z: per unit of support below the first value, and of boxes at the image
 # border. Fitted once to simulated crowds, without a command to repeat it; test_difficult_views.py checks the coverage.
@@ -143,8 +144,8 @@ class ErrorModel(NamedTuple):
         return (x_m + inside_m * self._x_slope_at(z_m) + self.x_bias.offset_m, y_m * measured_z_m / z_m, measured_z_m)
 
     def check_estimator(self, name):
-        """Raise ValueError if the model was fitted for another estimator."""
-        if self.provenance.estimator not in (name, ''):
+        """Raise ValueError if the model was fitted for another estimator. That of recorded positions is not known."""
+        if self.provenance.estimator not in (name, '', RECORDED):
             raise ValueError('the error model is for the estimator %s, not %s' % (self.provenance.estimator, name))
 
     def covariance(self, position_m):

@@ -274,7 +274,8 @@ class ViewerNode(object):
                 if self._label.typed is not None:
                     self._label.type(key)
                     key = ''
-                elif key in actions:
+                key = key.lower()  # with Caps Lock, too
+                if key in actions:
                     others.submit(actions[key]).add_done_callback(_complain)
             if self._is_paused and not rospy.is_shutdown():
                 others.submit(self.pause_or_resume)

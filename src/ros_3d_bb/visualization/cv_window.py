@@ -7,7 +7,9 @@ import cv2
 import numpy as np
 
 FLAGS = 0x10  # WINDOW_GUI_NORMAL, which old versions do not define: no toolbar, resizable with fixed aspect ratio
-NO_KEY = 255
+# X keysyms of keys on the keypad, and of those that edit text
+KEYSYMS = {0xff08: '\b', 0xff0d: '\r', 0xff8d: '\r', 0xff1b: '\x1b', 0xffad: '-', 0xffae: '.'}
+KEYSYMS.update((0xffb0 + digit, str(digit)) for digit in range(10))
 REMEDY = 'set ~window:=false (launch argument window:=false) to run without a window'
 
 
@@ -41,16 +43,28 @@ class Window(object):
         cv2.imshow(self._title, np.ascontiguousarray(picture[..., ::-1]))
 
     def key(self, wait_ms):
-        """Wait for a key up to `wait_ms`. Returns its character, or '' if no key is pressed.
+        """Wait for a key up to `wait_ms`. Returns its character, or '' if it has none, or no key is pressed.
 
         If several keys were pressed since the last call, OpenCV's Qt windows return the last one and drop the others.
+        Letters are lower case there.
         """
-        code = cv2.waitKey(wait_ms) & 0xff
-        return '' if code == NO_KEY else chr(code)
+        return character_of(cv2.waitKeyEx(wait_ms))
 
     def close(self):
         cv2.destroyAllWindows()
         cv2.waitKey(1)  # the toolkit closes the window in its event loop
+
+
+def character_of(code):
+    """Character of a key code of `cv2.waitKeyEx`; '' for no key (-1), and for keys such as Shift and the arrows.
+
+    The lower 16 bits are a Latin-1 character or an X keysym, whose lower 8 bits alone would be another character.
+    Qt's codes of letters such as ö are negative.
+    """
+    if code < -1:
+        return chr(code & 0xff).lower()
+    keysym = code & 0xffff
+    return chr(keysym) if keysym < 0x100 else KEYSYMS.get(keysym, '')
 
 
 def _check_display():

@@ -15,7 +15,7 @@ from ros_3d_bb.tracking.types import VISIBLE, TrackedObject
 
 GATE_M = 1.0
 KEPT = 1000  # score of a kept match; other matches have 0.5 at the gate to 1 at distance 0, as in TrackEval
-LONGEST_GAP = 1.5  # in image periods; a longer gap ends a visible interval
+LONGEST_GAP = 1.5  # in image periods of a camera; a longer gap ends a visible interval
 
 
 class Moment(NamedTuple):
@@ -55,15 +55,18 @@ class SceneScore(NamedTuple):
     false_share: float
 
 
-def score(moments):
-    """Compare tracks with ground truth. Takes a list of Moment ordered by stamp, returns a SceneScore."""
+def score(moments, cameras=1):
+    """Compare tracks with ground truth. Takes a list of Moment ordered by stamp, returns a SceneScore.
+
+    `cameras` is the number of cameras that take turns in the moments.
+    """
     matches, false, matcher = [], 0, ClearMatcher()
     for moment in moments:
         visible = [track for track in moment.tracks if track.status == VISIBLE]
         matches.append(matcher.match(moment.truth, visible))
         false += len(visible) - len(matches[-1])
     people = sorted(set(person.id for moment in moments for person in moment.truth))
-    return SceneScore([_person_score(person, moments, matches) for person in people], len(moments),
+    return SceneScore([_person_score(person, moments, matches, cameras) for person in people], len(moments),
                       false / float(max(1, len(moments))))
 
 
@@ -87,7 +90,7 @@ class ClearMatcher(object):
         return pairs
 
 
-def _person_score(person_id, moments, matches):
+def _person_score(person_id, moments, matches, cameras):
     ids, errors_m, visible_ns = [], [], []
     for moment, pairs in zip(moments, matches):
         if not any(person.id == person_id and person.status == VISIBLE for person in moment.truth):
@@ -98,14 +101,14 @@ def _person_score(person_id, moments, matches):
                 errors_m.append(np.linalg.norm((track.position_m - person.position_m)[:2]))
                 if ids[-1:] != [track.id]:
                     ids.append(track.id)
-    visible_s = _visible_s(visible_ns, [moment.stamp_ns for moment in moments])
+    visible_s = _visible_s(visible_ns, [moment.stamp_ns for moment in moments], cameras)
     return PersonScore(person_id, visible_s, len(errors_m) / float(max(1, len(visible_ns))), ids,
                        float(np.sqrt(np.mean(np.square(errors_m)))) if errors_m else float('nan'),
                        max(errors_m, default=float('nan')))
 
 
-def _visible_s(visible_ns, all_ns):
-    period_ns = np.median(np.diff(all_ns)) if len(all_ns) > 1 else 0
+def _visible_s(visible_ns, all_ns, cameras):
+    period_ns = cameras * np.median(np.diff(all_ns)) if len(all_ns) > 1 else 0
     gaps_ns = np.diff(visible_ns)
     return float(np.sum(gaps_ns[gaps_ns <= LONGEST_GAP * period_ns])) / NS
 

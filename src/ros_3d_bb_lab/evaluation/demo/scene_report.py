@@ -47,6 +47,7 @@ class Recording(NamedTuple):
     answered: int      # number of images for which the tracker published a message
     boxes: dict        # 2D boxes (n, 4) by stamp
     robot: np.ndarray  # path of the robot in the map, (n, 2)
+    cameras: int       # number of cameras, whose images are different moments
 
 
 def read_recording(bag):
@@ -78,7 +79,8 @@ def read_recording(bag):
                       tracks_from_msg(tracks[stamp_ns]) if stamp_ns in tracks else [])
                for stamp_ns in sorted(truth or tracks)]
     answered = len(set(truth or tracks) & set(tracks))
-    return Recording(moments, bool(truth), answered, boxes, np.array(robot).reshape(-1, 2))
+    return Recording(moments, bool(truth), answered, boxes, np.array(robot).reshape(-1, 2),
+                     max(1, len(topics_of_cameras(bag, COLOR_TOPIC)), len(boxes_topics)))
 
 
 def table_of_tracks(moments):
@@ -202,7 +204,7 @@ def write_report(bag_path, picture_path, color_topic=''):
     """
     with rosbag.Bag(bag_path) as bag:
         recording = read_recording(bag)
-        header, rows, summary = (table(score(recording.moments)) if recording.has_truth
+        header, rows, summary = (table(score(recording.moments, recording.cameras)) if recording.has_truth
                                  else table_of_tracks(recording.moments))
         summary = '; '.join(filter(None, (summary, '%d of %d images answered' % (
             recording.answered, len(recording.moments)), why_empty(recording))))
@@ -229,11 +231,17 @@ def main():
     parser.add_argument('--csv', default='', metavar='FILE', help='also write the tracks to this CSV file')
     arguments = parser.parse_args()
     picture = arguments.picture or os.path.splitext(arguments.bag)[0] + '.png'
+    picture += '' if os.path.splitext(picture)[1] else '.png'
+    output = 'report'
     try:
         lines = write_report(arguments.bag, picture, arguments.color_topic)
         if arguments.csv:
+            output = 'table'
             write_csv(arguments.bag, arguments.csv)
             lines.append('table: %s' % arguments.csv)
+    except rosbag.ROSBagUnindexedException:
+        sys.exit('scene_report: %s has no index, because its recording was interrupted; repair it with: rosbag '
+                 'reindex; no report was written' % arguments.bag)
     except (ValueError, OSError, rosbag.ROSBagException) as error:
-        sys.exit('scene_report: %s: %s; no report was written' % (arguments.bag, error))
+        sys.exit('scene_report: %s: %s; no %s was written' % (arguments.bag, error, output))
     print('\n'.join(lines + ['picture: %s' % picture, 'report: %s.html' % os.path.splitext(picture)[0]]))

@@ -30,6 +30,8 @@ def main():
     except (ValueError, OSError) as error:
         sys.exit('./run noise: %s' % error)
     print(text_of(analysis))
+    if analysis.model_note:
+        print('./run noise: note: %s' % analysis.model_note, file=sys.stderr)
     print('detector: not measured, default values; --recordings measures it')
     print('report: %s' % (folder / 'report.html'))
 

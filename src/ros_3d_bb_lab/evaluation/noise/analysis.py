@@ -69,6 +69,15 @@ class Analysis(NamedTuple):
         """Pairs (axis, ClusterStatistics) of the clusters that the variances are computed from."""
         return [(name, cluster) for name, axis in (('Z', self.z), ('X', self.x_variance)) for cluster in axis.clusters]
 
+    @property
+    def model_note(self):
+        """Why there is no cross-validated error model, and what error_model.yaml is instead; '' if there is one."""
+        if self.model is not None:
+            return ''
+        return 'no cross-validated error model: %s; %s' % (self.no_model, (
+            'no error_model.yaml is written' if self.thesis_form is None
+            else 'error_model.yaml has the form of the thesis instead'))
+
 
 def analyse(inputs):
     """Analyse `inputs`, and return an Analysis. Raises ValueError if there are too few measurements."""

@@ -20,7 +20,7 @@ ESTIMATORS = {'foreground': 'foreground (that of bbox3d_node)', 'median': 'media
 def write_results(folder, analysis):
     """Write the report as HTML, its figures, summary.json and the error models into a folder (pathlib.Path).
 
-    The folder is created if it does not exist. Raises OSError.
+    The folder is created if it does not exist. Error models of an earlier analysis do not remain. Raises OSError.
     """
     folder.mkdir(parents=True, exist_ok=True)
     captions = write_figures(folder, analysis)
@@ -34,6 +34,8 @@ def write_results(folder, analysis):
                         ('error_model.yaml', analysis.model or analysis.thesis_form)):
         if model is not None:
             write_error_model(folder / name, model)
+        elif (folder / name).exists():
+            (folder / name).unlink()
 
 
 def text_of(analysis):
@@ -61,16 +63,24 @@ def _summary(analysis):
         Paragraph('This report describes how far positions of people, as measured by a depth camera, are from their '
                   'true positions, and a model of these errors. Error is measured minus true. X is to the right of the '
                   'camera and Z ahead of it, in its optical frame.'), Table('main results', header, tuple(rows))]
-    far = max(analysis.z.clusters, key=lambda cluster: abs(cluster.mean_m))
-    text = ('At Z = %.2f m the mean error in Z is %+.3f m, %.1f times the standard deviation there: inflating '
-            'obstacles by σ alone does not cover it. The error model corrects the mean error.' % (
-                far.truth_m, far.mean_m, abs(far.mean_m) / max(far.sigma_m, 1e-6))
-            if abs(far.mean_m) > far.sigma_m else 'The mean error never exceeds the standard deviation.')
+    text = _bias_text(analysis)
     if model is not None:
         text += (' Validated at positions that were not used for the fit, the 95 %% ellipse of the model contains '
                  '%.0f %% of the measurements, and the remaining error in the plane is %.3f m (RMSE).'
                  % (100 * model.cross_validated.coverage_95, model.cross_validated.rmse_plane_m))
     return pieces + [Paragraph(text)]
+
+
+def _bias_text(analysis):
+    biased = [cluster for cluster in analysis.z.clusters if abs(cluster.mean_m) > cluster.sigma_m]
+    if not biased:
+        return 'The mean error in Z nowhere exceeds the standard deviation.'
+    far = max(biased, key=lambda cluster: abs(cluster.mean_m))
+    return ('At Z = %.2f m the mean error in Z is %+.3f m, %.1f times the standard deviation there: inflating '
+            'obstacles by σ alone does not cover it.%s' % (
+                far.truth_m, far.mean_m, abs(far.mean_m) / max(far.sigma_m, 1e-6),
+                '' if analysis.model is None and analysis.thesis_form is None
+                else ' The error model corrects the mean error.'))
 
 
 def _setup(analysis):
@@ -157,8 +167,7 @@ def _distributions(analysis):
 
 def _model(analysis):
     if analysis.model is None:
-        pieces = [Paragraph('No cross-validated model: %s. error_model.yaml has the form of the thesis instead.'
-                            % analysis.no_model)]
+        pieces = [Paragraph('%s%s.' % (analysis.model_note[:1].upper(), analysis.model_note[1:]))]
     else:
         pieces = _model_pieces(analysis.model)
     return [Heading('Error model and its validation')] + pieces + [Paragraph(

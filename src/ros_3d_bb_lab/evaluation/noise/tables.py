@@ -13,11 +13,13 @@ import numpy as np
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import plausible, truncated_edges
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
+from ros_3d_bb.estimation.error_model import RECORDED
 from ros_3d_bb.sessions.plausibility import likely_errors, outlier_of
 from ros_3d_bb.sessions.session_reader import SessionError, annotated_people, read_depth, read_session
 
 AXES = ('X', 'Z')
 LEAST_IN_CLUSTER = 3
+LEAST_EXTENT_M = 0.05  # tables of less are in metres
 ROUNDING_MM = 1.01  # errors may have been computed before the values were rounded
 
 
@@ -56,9 +58,10 @@ class MeasurementTable(NamedTuple):
         return tuple(outlier for outlier in found if outlier is not None)
 
     def without(self, outliers):
-        """Select the measurements that are not among the outliers."""
-        names = set(outlier.name for outlier in outliers)
-        return self._part(np.array([name not in names for name in self.ids]))
+        """Select the measurements that are not among the outliers. Others of the same image remain."""
+        found = set((outlier.name, *outlier.truth_m.tolist()) for outlier in outliers)
+        return self._part(np.array([(name, *truth_m) not in found
+                                    for name, truth_m in zip(self.ids, self.truth_m.tolist())]))
 
     def _is_complete(self):
         return np.isfinite(np.concatenate((self.measured_m[:, [0, 2]], self.truth_m), axis=1)).all(axis=1)
@@ -123,6 +126,10 @@ def read_table(path, axis):
     if not rows:
         raise ValueError('%s: a table without rows' % path)
     values_m = np.array(rows).reshape(-1, 2, 2) / 1000  # row, axis, (measured, true)
+    extent_m = np.abs(np.nan_to_num(values_m[:, AXES.index(axis), 1])).max()
+    if 0 < extent_m < LEAST_EXTENT_M:
+        raise ValueError('%s: "%s true" is %g mm at most; the values seem to be metres, and millimetres are expected'
+                         % (path, axis, 1000 * extent_m))
     measured_m = np.stack((values_m[:, 0, 0], np.zeros(len(rows)), values_m[:, 1, 0]), axis=1)
     return MeasurementTable(path, measured_m, values_m[:, :, 1], np.zeros(len(rows), bool), tuple(lines))
 
@@ -161,7 +168,7 @@ def _dates_of(frames):
 
 def _estimate(frame, session, name):
     """Position (3,) of the annotated person of a frame, whose box is the first one, or None."""
-    if name == 'recorded':
+    if name == RECORDED:
         return frame.estimate_m
     boxes = estimate_boxes(read_depth(frame, session), frame.boxes_px, session.camera, estimator_named(name))
     return boxes[0].center_m if boxes and plausible(boxes[0]) else None
