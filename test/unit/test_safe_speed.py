@@ -1,4 +1,6 @@
 """The highest safe speed against the motion of the robot and people that it assumes."""
+import time
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -117,6 +119,17 @@ def test_shorter_predictions_of_the_tracker_hardly_allow_more_speed(prediction_t
     usual_mps, short_mps = (speed_among(*tracked_standing(time_s), params=SafeSpeedParams())
                             for time_s in (2.0, prediction_time))
     assert usual_mps - 0.1 < short_mps < usual_mps + more_mps
+
+
+def test_people_farther_ahead_take_little_time_once_a_near_one_limits_the_speed():
+    """Of a robot whose limit without people is as high as it can be set."""
+    tracks = [track_at([3 + number, 0.2, 0.9], [0, 0, 0], number=number) for number in range(20)]
+
+    def cpu_s(count):
+        began_s = time.process_time()
+        speed_among(*tracks[:count][::-1], params=PARAMS._replace(highest_speed=10.0))
+        return time.process_time() - began_s
+    assert min(cpu_s(20) for _again in range(3)) < 6 * min(cpu_s(1) for _again in range(5))
 
 
 def test_limited_velocities_stay_on_their_path():

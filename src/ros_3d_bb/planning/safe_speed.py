@@ -55,18 +55,24 @@ def highest_safe_speed(tracks, age_s, robot_from_tracks, velocity, params):
         linear velocity.
     params : SafeSpeedParams
     """
-    reaction_s, deceleration = params.reaction_time, params.deceleration
-    longest_s = reaction_s + params.highest_speed / deceleration
-    longest_m = params.highest_speed * (reaction_s + longest_s) / 2
-    ahead_s = np.arange(0, longest_s + TIME_STEP_S, TIME_STEP_S)
-    places_m = _path(velocity, np.arange(0, longest_m + 2 * PATH_STEP_M, PATH_STEP_M))
-    speed_mps = params.highest_speed
-    for track in tracks:
-        free_m = _free_distances(track, age_s + ahead_s, robot_from_tracks, places_m, params)
-        by_distance = np.sqrt((deceleration * reaction_s) ** 2 + 2 * deceleration * free_m) - deceleration * reaction_s
-        by_time = deceleration * (ahead_s - TIME_STEP_S - reaction_s)  # slower robots stand before the person is there
-        speed_mps = min(speed_mps, np.maximum(by_distance, by_time).min())
+    speed_mps, robot_m = params.highest_speed, np.linalg.inv(robot_from_tracks)[:3, 3]
+    for track in sorted(tracks, key=lambda each: np.linalg.norm(each.position_m - robot_m)):  # the nearest limit most
+        speed_mps = min(speed_mps, _safe_speed(track, age_s, robot_from_tracks, velocity, params, speed_mps))
     return float(speed_mps)
+
+
+def _safe_speed(track, age_s, robot_from_tracks, velocity, params, most_mps):
+    """As `highest_safe_speed` of one track; any higher speed where it is more than `most_mps`. Only the times and the
+    path until the robot stands after this speed are computed: their product, which is the cost, grows with its cube."""
+    reaction_s, deceleration = params.reaction_time, params.deceleration
+    braking_s = most_mps / deceleration
+    ahead_s = np.arange(0, reaction_s + braking_s + TIME_STEP_S, TIME_STEP_S)
+    longest_m = most_mps * (reaction_s + braking_s / 2)
+    places_m = _path(velocity, np.arange(0, longest_m + 2 * PATH_STEP_M, PATH_STEP_M))
+    free_m = _free_distances(track, age_s + ahead_s, robot_from_tracks, places_m, params)
+    by_distance = np.sqrt((deceleration * reaction_s) ** 2 + 2 * deceleration * free_m) - deceleration * reaction_s
+    by_time = deceleration * (ahead_s - TIME_STEP_S - reaction_s)  # slower robots stand before the person is there
+    return np.maximum(by_distance, by_time).min()
 
 
 def limited_velocity(velocity, limit):
