@@ -190,6 +190,11 @@ def test_cells_are_occupied_from_65_on(rig):
     assert occupied_from_msg(map_in('map')).cells.tolist() == [[True, False], [False, False]]
 
 
+def test_the_frame_of_the_tracks_has_no_slash_which_tf2_rejects():
+    rig = Rig(target_frame='/map')
+    assert rig.send(START_NS).header.frame_id == 'map'
+
+
 def test_tracks_are_withheld_while_a_camera_is_silent():
     rig = Rig('front', 'rear', camera_timeout=0.5)
     assert rig.send(START_NS, 'front') is None

@@ -98,6 +98,7 @@ class TrackingStage(object):
 
     def __init__(self, params, tracking, events, transforms, on_tracks, last_id=0):
         _check(params)
+        params = params._replace(target_frame=params.target_frame.lstrip('/'))  # tf2 rejects frames with a slash
         self._params, self._events, self._transforms, self._on_tracks = params, events, transforms, on_tracks
         self.cameras = tuple(params.cameras) or ('',)
         self.uses_camera_info = params.tracker != 'thesis'
@@ -132,7 +133,7 @@ class TrackingStage(object):
     def set_map(self, message):
         """Start no tracks in the occupied cells of a nav_msgs/OccupancyGrid. Raises ValueError if it is in another
         frame than the tracks."""
-        if message.header.frame_id.lstrip('/') != self._params.target_frame.lstrip('/'):
+        if message.header.frame_id.lstrip('/') != self._params.target_frame:
             raise ValueError('its frame is %r, and that of the tracks %r; the same expected, and no cells are ignored'
                              % (message.header.frame_id, self._params.target_frame))
         with self.lock:
