@@ -37,11 +37,13 @@ class Result(NamedTuple):
 
 
 class Rig(TrackingStage):
-    """A stage of some cameras; of a single one without names. Boxes arrive at `now_ns`."""
+    """A stage of some cameras; of a single one without names. Boxes arrive at `now_ns`. Without `camera_timeout`, each
+    image has a result."""
 
-    def __init__(self, *cameras, **params):
+    def __init__(self, *cameras, camera_timeout=0.0, **params):
         self.now_ns, self.transforms, self.events, self._results = 0, Transforms(), EventCounter(), []
-        super().__init__(TrackerNodeParams(cameras=list(cameras), **params), [kind() for kind in TRACKING_PARAMS],
+        params.update(cameras=list(cameras), camera_timeout=camera_timeout)
+        super().__init__(TrackerNodeParams(**params), [kind() for kind in TRACKING_PARAMS],
                          self.events, self.transforms, lambda *result: self._results.append(Result(*result)))
 
     @property

@@ -108,7 +108,13 @@ def test_before_its_stamp_a_walking_person_is_on_the_way():
 def test_positions_become_less_certain_beyond_the_predictions():
     track = track_at([3, 1, 0.9], [0, 0, 0], covariance=0.01 * np.eye(6))
     track = track._replace(prediction_covariance_m2=(0.01 + 0.02 * np.arange(1, 9))[:, None, None] * np.eye(3))
-    np.testing.assert_allclose(covariances_after(track, np.array([2.0, 3.0]))[:, 0, 0], [0.17, 0.25])
+    np.testing.assert_allclose(covariances_after(track, np.array([-0.1, 2.0, 3.0]))[:, 0, 0], [0.01, 0.17, 0.37])
+
+
+def test_without_predictions_positions_become_less_certain_by_the_velocity():
+    track = track_at([3, 1, 0.9], [0, 0, 0], np.empty((0, 3)), covariance=np.diag([0.01, 0.01, 0, 0.04, 0.09, 0]))
+    found_m2 = covariances_after(track._replace(prediction_covariance_m2=np.empty((0, 3, 3))), [0.0, 2.0])
+    np.testing.assert_allclose(found_m2, [np.diag([0.01, 0.01, 0]), np.diag([0.17, 0.37, 0])])
 
 
 @pytest.mark.parametrize('heading', [0.0, np.pi / 4, np.pi / 2])

@@ -39,7 +39,7 @@ def messages_on(bag_path, topic):
 def test_each_person_is_one_track_in_both_views(bags):
     with rosbag.Bag(bags[1]) as bag:
         recording = read_recording(bag)
-    assert len(recording.moments) == recording.answered == 39
+    assert (len(recording.moments), recording.answered) == (39, 38)  # no tracks until both cameras have sent boxes
     result = score(recording.moments, recording.cameras)
     for person in result.people:
         assert person.visible_s > 2.5, person  # the first one in every second image
@@ -61,7 +61,7 @@ def test_boxes_are_in_the_namespaces_and_people_on_one_topic(bags):
     assert frames == {'front': {'front_color_optical_frame'}, 'left': {'left_color_optical_frame'}}
     tracks = messages_on(bags[1], 'ros_3d_bb/tracks')
     stamps = [stamp_of(message) for message in tracks]
-    assert len(tracks) == 39 and stamps == sorted(stamps)
+    assert len(tracks) == 38 and stamps == sorted(stamps)
     assert not messages_on(bags[1], 'ros_3d_bb/bb_3d')
 
 

@@ -87,8 +87,7 @@ def test_pixels_of_people_become_invalid():
     header = Header(stamp=time_from(STAMP_NS), frame_id='camera')
     image = fill_image(Image(header=header), depth_mm, '16UC1')
     with node_with('depth', walking(2.0, 0.0)) as connections:
-        connections.send('~depth', image)
-        assert '~depth_static' in connections.publishers and connections.counts['depth rejected'] == 1
+        assert sent(connections, 'depth', image) == image and connections.counts['depth with people'] == 1
         connections.send('~camera_info', camera_info(STAMP_NS))
         values = imgmsg_to_depth(sent(connections, 'depth', image)).values
     assert (values[20:30, 26:38] == 0).all() and (values[depth_mm == 4000] == 4000).all()
@@ -123,6 +122,14 @@ def test_clouds_of_other_layouts_are_rejected(change, words):
         setattr(cloud, name, value)
     with pytest.raises(ValueError, match=words):
         points_of_cloud(cloud)
+
+
+def test_a_cloud_of_another_layout_passes_as_it_is_also_where_people_are():
+    """With gaps between the rows. A costmap that received it only without people would be blind beside them."""
+    cloud = points_to_msg(np.array([[2.0, 0.1, 0.5]]), Header(stamp=time_from(STAMP_NS), frame_id='base_link'))
+    cloud.row_step, cloud.data = 16, cloud.data + bytes(4)
+    with node_with('points', walking(2.0, 0.1)) as connections:
+        assert sent(connections, 'points', cloud) == cloud and connections.counts['points with people'] == 1
 
 
 def test_other_fields_of_a_cloud_are_kept():

@@ -58,9 +58,9 @@ class Bridge(object):
         turn.z = turn.w = 0.5 ** 0.5
         self._connections.send('/tf', TFMessage([transform]))
 
-    def send(self, stamp_ns, *tracks):
-        self._connections.send(TRACKS_TOPIC, TrackedObjectArray(header=Header(stamp=time_from(stamp_ns),
-                                                                              frame_id='map'), objects=list(tracks)))
+    def send(self, stamp_ns, *tracks, frame_id='map'):
+        header = Header(stamp=time_from(stamp_ns), frame_id=frame_id)
+        self._connections.send(TRACKS_TOPIC, TrackedObjectArray(header=header, objects=list(tracks)))
 
     def count(self, topic):
         return self._connections.publishers[topic].count
@@ -91,6 +91,15 @@ def test_an_invalid_track_is_dropped_and_the_others_are_forwarded():
         assert [found.name for found in bridge.newest(PEOPLE)[1]] == ['1', '3']
         assert len(bridge.newest(POINTS)[1])
         assert (bridge.counts['tracks dropped'], bridge.counts['tracks forwarded']) == (1, 1)
+
+
+def test_no_frame_of_an_output_has_a_slash_which_tf2_rejects():
+    with bridge_with('costmap, people, teb', robot_frame='/base_link', planner_frame='/odom') as bridge:
+        bridge.send_tf(START_NS, 'base_link', (0, 0, 0))
+        bridge.send_tf(START_NS, 'odom', (0, 0, 0))
+        bridge.send(START_NS, person(1, 2, 0), frame_id='/map')
+        assert [bridge.message(topic).header.frame_id for topic in (POINTS, COSTS, RING, PEOPLE, TEB)] == [
+            'base_link', 'base_link', 'base_link', 'map', 'odom']
 
 
 def test_costmap_points_are_in_the_robots_frame():

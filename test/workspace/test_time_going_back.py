@@ -53,7 +53,7 @@ def test_image_awaiting_its_transform_is_dropped_when_time_goes_back(rig):
 
 def test_the_node_publishes_nothing_from_before_a_jump():
     """The tf buffer is asked for the rear camera's transform when the front camera's stamps go back."""
-    with masterless({'tf_timeout': 0.0, 'cameras': 'front, rear'}) as connections:
+    with masterless({'tf_timeout': 0.0, 'cameras': 'front, rear', 'camera_timeout': 0.0}) as connections:
         TrackerNode()
         tracks, transforms = connections.publishers['ros_3d_bb/tracks'], Transforms()
 

@@ -190,10 +190,29 @@ def test_cells_are_occupied_from_65_on(rig):
     assert occupied_from_msg(map_in('map')).cells.tolist() == [[True, False], [False, False]]
 
 
+def test_the_frame_of_the_tracks_has_no_slash_which_tf2_rejects():
+    rig = Rig(target_frame='/map')
+    assert rig.send(START_NS).header.frame_id == 'map'
+
+
 def test_tracks_are_withheld_while_a_camera_is_silent():
     rig = Rig('front', 'rear', camera_timeout=0.5)
     assert rig.send(START_NS, 'front') is None
     assert rig.send(START_NS + NS // 10, 'rear') is not None and rig.send(START_NS + NS // 5, 'front') is not None
     assert rig.send(START_NS + 7 * NS // 10, 'front') is None
-    assert 'no boxes of rear for 0.5 s' in rig.events.sentences['tracks withheld']
+    assert 'no boxes of rear within the last 0.5 s' in rig.events.sentences['tracks withheld']
     assert rig.send(START_NS + 8 * NS // 10, 'rear') is not None
+
+
+def test_a_camera_that_is_silent_since_a_jump_back_is_noticed():
+    """A bag is repeated, the second time without the rear camera."""
+    rig = Rig('front', 'rear', camera_timeout=1.0)
+    for number in range(50):
+        rig.now_ns = number * NS // 10
+        assert rig.send(START_NS + rig.now_ns, 'rear') is None or number
+        assert rig.send(START_NS + rig.now_ns, 'front') is not None
+    results = []
+    for number in range(30):
+        rig.now_ns += NS // 10
+        results.append(rig.send(START_NS + number * NS // 10, 'front'))
+    assert rig.events.counts['jumps back in time'] == 1 and results[11:] == [None] * 19

@@ -40,8 +40,8 @@ class PeopleRemovalNode(object):
     """Remove tracked people from laser scans, point clouds and depth images.
 
     The outputs are for costmaps, SLAM and localisation, which take people for obstacles that stay. People are where
-    their tracks predict them at the stamp of the measurements. Without tracks for ~timeout, or without a transform,
-    measurements pass as they are. Parameters: config/people_removal.yaml.
+    their tracks predict them at the stamp of the measurements. Without tracks for ~timeout, a transform, or the
+    camera_info of depth images, measurements pass as they are, and so do those of another layout. Parameters: config/people_removal.yaml.
 
     Subscribes
     ----------
@@ -108,6 +108,8 @@ class PeopleRemovalNode(object):
         except tf2_ros.TransformException as error:
             self._diagnostics.warn('no transform', 'no transform from %s to %s: %s; people are not removed from %s'
                                    % (message.header.frame_id, newest.frame_id, error, name))
+        except ValueError as error:  # costmaps need the measurements all the more where people are
+            self._diagnostics.warn('%s with people' % name, '%s; people are not removed from %s' % (error, name))
         return message
 
     def _without_in_scan(self, message, fixed_from_sensor, cylinders):

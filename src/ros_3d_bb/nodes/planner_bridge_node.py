@@ -80,7 +80,7 @@ class PlannerTopic(object):
         if not self._publisher.get_num_connections():
             return
         output = self.output
-        frame_id = output.frame or received.frame_id
+        frame_id = (output.frame or received.frame_id).lstrip('/')  # tf2 rejects frames with a slash
         header = Header(stamp=time_from(0 if output.latest_tf else stamp_ns), frame_id=frame_id)
         self._publisher.publish(output.write(tracks, received.transforms[output.frame, output.latest_tf], header))
 

@@ -54,8 +54,9 @@ class TrackerNodeParams(NamedTuple):
     classes_file: str = CLASSES_FILE
     tf_timeout: float = Param(0.2, 'How long to wait for the transform at the stamp of the boxes.', 's')
     camera_timeout: float = Param(
-        0.0, 'With several cameras, no tracks are published while there are no boxes of one of them for this time, so '
-        'that planners stop. 0: those of the other cameras are published.', 's')
+        1.0, 'With several cameras, no tracks are published while there are no boxes of one of them for this time, so '
+        'that planners stop. Detectors must publish empty arrays, too (publish_empty). 0: the tracks of the other '
+        'cameras are published, and planners drive on as if the silent one saw nobody.', 's')
     use_map: bool = Param(False, 'Whether no track starts in occupied cells of the static map.', section=SET_BY_LAUNCH)
 
 
@@ -97,6 +98,7 @@ class TrackingStage(object):
 
     def __init__(self, params, tracking, events, transforms, on_tracks, last_id=0):
         _check(params)
+        params = params._replace(target_frame=params.target_frame.lstrip('/'))  # tf2 rejects frames with a slash
         self._params, self._events, self._transforms, self._on_tracks = params, events, transforms, on_tracks
         self.cameras = tuple(params.cameras) or ('',)
         self.uses_camera_info = params.tracker != 'thesis'
@@ -131,7 +133,7 @@ class TrackingStage(object):
     def set_map(self, message):
         """Start no tracks in the occupied cells of a nav_msgs/OccupancyGrid. Raises ValueError if it is in another
         frame than the tracks."""
-        if message.header.frame_id.lstrip('/') != self._params.target_frame.lstrip('/'):
+        if message.header.frame_id.lstrip('/') != self._params.target_frame:
             raise ValueError('its frame is %r, and that of the tracks %r; the same expected, and no cells are ignored'
                              % (message.header.frame_id, self._params.target_frame))
         with self.lock:
@@ -212,8 +214,8 @@ class TrackingStage(object):
         self._boxes_ns[camera] = stamp_ns
         silent = self._silent_cameras(newest_ns)
         if silent:
-            self._events.warn('tracks withheld', 'no boxes of %s for %g s (~camera_timeout): no tracks are published, '
-                              'so that planners stop' % (', '.join(silent), self._params.camera_timeout))
+            self._events.warn('tracks withheld', 'no boxes of %s within the last %g s (~camera_timeout): no tracks are '
+                              'published, so that planners stop' % (', '.join(silent), self._params.camera_timeout))
             return
         self._on_tracks(tracks, Header(stamp=time_from(newest_ns), frame_id=self._params.target_frame))
 
@@ -258,6 +260,7 @@ class TrackingStage(object):
                               % (self._clocks.newest_ns / NS, stamp_ns / NS))
             self._tracker.reset()
             self._clocks.restart()
+            self._boxes_ns.clear()
             self._jumps += 1
         return trusted is None
 

@@ -71,15 +71,17 @@ def position_after(track, ahead_s):
 
 def covariances_after(track, ahead_s):
     """Covariances (n, 3, 3) of the positions of a track `ahead_s` (n,) seconds after its stamp, m², interpolated
-    linearly; 0 if unknown. Beyond the last one they go on to grow as before it.
+    linearly; 0 if unknown. Beyond the last one, what they have grown since the stamp goes on to grow with the square of
+    the time. Without predictions, it is that by the covariance of the velocity.
     """
     if track.covariance is None or track.prediction_covariance_m2 is None:
         return np.zeros((len(ahead_s), 3, 3))
     known_m2 = np.concatenate((track.covariance[np.newaxis, :3, :3], track.prediction_covariance_m2))
-    beyond = np.maximum(np.asarray(ahead_s) / track.prediction_step_s - len(track.prediction_covariance_m2), 0)
-    growth_m2 = known_m2[-1] - known_m2[-2] if len(known_m2) > 1 else np.zeros((3, 3))
+    end_s = track.prediction_step_s * len(track.prediction_covariance_m2)
+    beyond_s2 = np.maximum(np.maximum(ahead_s, 0.0) ** 2 - end_s ** 2, 0)
+    growth_m2ps2 = (known_m2[-1] - known_m2[0]) / end_s ** 2 if end_s else track.covariance[3:, 3:]
     return (_interpolated(known_m2.reshape(-1, 9), track.prediction_step_s, ahead_s).reshape(-1, 3, 3)
-            + beyond[:, np.newaxis, np.newaxis] * growth_m2)
+            + beyond_s2[:, np.newaxis, np.newaxis] * growth_m2ps2)
 
 
 def _interpolated(rows, step_s, times_s):

@@ -3,6 +3,7 @@
 Robot frame, metres, radians, seconds. The robot is a disc around the origin of its frame, which moves straight or
 along a circle.
 """
+import functools
 import math
 from typing import NamedTuple
 
@@ -67,11 +68,10 @@ def highest_safe_speed(tracks, age_s, robot_from_tracks, velocity, params):
         linear velocity.
     params : SafeSpeedParams
     """
-    ahead_s, places_m = _times_and_places(velocity, params)
-    speed_mps = params.highest_speed
-    for track in tracks:
-        distances = _distances(track, age_s + ahead_s, robot_from_tracks, places_m, params)
-        speed_mps = min(speed_mps, _speed_before(distances, ahead_s, params))
+    speed_mps, robot_m = params.highest_speed, np.linalg.inv(robot_from_tracks)[:3, 3]
+    for track in sorted(tracks, key=lambda each: np.linalg.norm(each.position_m - robot_m)):  # the nearest limit most
+        distances = functools.partial(_distances_to_person, track, age_s, robot_from_tracks, params)
+        speed_mps = min(speed_mps, _safe_speed(distances, velocity, params, speed_mps))
     return speed_mps
 
 
@@ -81,12 +81,10 @@ def speed_before_corners(corners_m, age_s, velocity, params, corner_params):
     As `highest_safe_speed`, with a circle around each corner (n, 2) in which the person may be, in the frame of the
     robot `age_s` seconds ago. It is not less than `corner_speed`.
     """
-    ahead_s, places_m = _times_and_places(velocity, params)
-    reaches_m = params.robot_radius + params.people_clearance + corner_params.emerging_speed * (age_s + ahead_s)
     speed_mps = params.highest_speed
-    for corner_m in corners_m:
-        distances = np.linalg.norm(places_m - corner_m, axis=1) / reaches_m[:, np.newaxis]
-        speed_mps = min(speed_mps, _speed_before(distances, ahead_s, params))
+    for corner_m in sorted(corners_m, key=np.linalg.norm):
+        distances = functools.partial(_distances_to_corner, corner_m, age_s, params, corner_params.emerging_speed)
+        speed_mps = min(speed_mps, _safe_speed(distances, velocity, params, speed_mps))
     return max(speed_mps, corner_params.corner_speed)
 
 
@@ -99,13 +97,25 @@ def limited_velocity(velocity, limit):
     return tuple([factor * part for part in velocity])
 
 
-def _times_and_places(velocity, params):
-    """Times (n,) until the robot stands, and places (m, 2) that it can reach until then, with steps of
-    `PATH_STEP_M`."""
-    longest_s = params.reaction_time + params.highest_speed / params.deceleration
-    longest_m = params.highest_speed * (params.reaction_time + longest_s) / 2
-    ahead_s = np.arange(0, longest_s + TIME_STEP_S, TIME_STEP_S)
-    return ahead_s, _path(velocity, np.arange(0, longest_m + 2 * PATH_STEP_M, PATH_STEP_M))
+def _safe_speed(distances_to, velocity, params, most_mps):
+    """Highest speed from which the robot stops before a place that is occupied then; any higher speed where it is more
+    than `most_mps`. Only the times and the path until the robot stands after this speed are computed: their product,
+    which is the cost, grows with its cube.
+
+    `distances_to` is called with times (n,) and places (m, 2) and returns distances (n, m), which are at most 1 at
+    occupied places. Only those that decrease along the path count.
+    """
+    reaction_s, deceleration = params.reaction_time, params.deceleration
+    braking_s = most_mps / deceleration
+    ahead_s = np.arange(0, reaction_s + braking_s + TIME_STEP_S, TIME_STEP_S)
+    longest_m = most_mps * (reaction_s + braking_s / 2)
+    distances = distances_to(ahead_s, _path(velocity, np.arange(0, longest_m + 2 * PATH_STEP_M, PATH_STEP_M)))
+    is_met = (distances <= 1) & (np.gradient(distances, axis=1) < 0)
+    first = np.where(is_met.any(axis=1), is_met.argmax(axis=1), np.inf)
+    free_m = np.maximum(first - 1, 0) * PATH_STEP_M
+    by_distance = np.sqrt((deceleration * reaction_s) ** 2 + 2 * deceleration * free_m) - deceleration * reaction_s
+    by_time = deceleration * (ahead_s - TIME_STEP_S - reaction_s)  # slower robots stand before the person is there
+    return float(np.maximum(by_distance, by_time).min())
 
 
 def _path(velocity, lengths_m):
@@ -118,9 +128,10 @@ def _path(velocity, lengths_m):
     return lengths_m[:, np.newaxis] * along.dot([[cos, sin], [-sin, cos]])
 
 
-def _distances(track, ahead_s, robot_from_tracks, places_m, params):
+def _distances_to_person(track, age_s, robot_from_tracks, params, ahead_s, places_m):
     """Distances (n, m) of places (m, 2) from the centre of a person at times (n,); 1: on the ellipse."""
     rotation, shift_m = robot_from_tracks[:2, :2], robot_from_tracks[:2, 3]
+    ahead_s = age_s + ahead_s
     centers_m = position_after(track, ahead_s)[:, :2].dot(rotation.T) + shift_m
     covariances_m2 = np.matmul(np.matmul(rotation, covariances_after(track, ahead_s)[:, :2, :2]), rotation.T)
     variances_m2, axes = np.linalg.eigh(covariances_m2)
@@ -130,14 +141,7 @@ def _distances(track, ahead_s, robot_from_tracks, places_m, params):
     return np.linalg.norm(offsets_m / semi_axes_m[:, np.newaxis], axis=2)
 
 
-def _speed_before(distances, ahead_s, params):
-    """Highest speed from which the robot stops before places that are occupied then: those with distances (n, m) of at
-    most 1 at times (n,) that decrease along its path.
-    """
-    is_met = (distances <= 1) & (np.gradient(distances, axis=1) < 0)
-    first = np.where(is_met.any(axis=1), is_met.argmax(axis=1), np.inf)
-    free_m = np.maximum(first - 1, 0) * PATH_STEP_M
-    reaction_s, deceleration = params.reaction_time, params.deceleration
-    by_distance = np.sqrt((deceleration * reaction_s) ** 2 + 2 * deceleration * free_m) - deceleration * reaction_s
-    by_time = deceleration * (ahead_s - TIME_STEP_S - reaction_s)  # slower robots stand before the person is there
-    return float(np.maximum(by_distance, by_time).min())
+def _distances_to_corner(corner_m, age_s, params, people_mps, ahead_s, places_m):
+    """Distances (n, m) of places (m, 2) from a corner at times (n,); 1: on the circle in which people may be."""
+    reaches_m = params.robot_radius + params.people_clearance + people_mps * (age_s + ahead_s)
+    return np.linalg.norm(places_m - corner_m, axis=1) / reaches_m[:, np.newaxis]

@@ -58,7 +58,7 @@ class LatestTracks(object):
         with self._diagnostics.receiving('tracks'):
             tracks, faults = usable_tracks(tracks_from_msg(message))
             self._diagnostics.count_dropped('tracks', faults)
-            received = Tracks(tracks, stamp_of(message), message.header.frame_id)
+            received = Tracks(tracks, stamp_of(message), message.header.frame_id.lstrip('/'))
             self._newest = received
             self._on_tracks(received)
             self._diagnostics.record_latency(message.header.stamp)
