@@ -123,6 +123,14 @@ def test_without_detector_the_boxes_in_the_bag_are_used(session_bag, tmp_path):
         assert len(boxes3d.boxes) == len(boxes2d.data) // 4
 
 
+def test_names_without_a_slash_are_those_of_the_nodes(scene, tmp_path):
+    """rosbag record stores the names of topics as they are given on its command line."""
+    recorded = rewritten(scene, tmp_path / 'in.bag', lambda topic, *rest: (topic[1:],) + rest)
+    process_bag(scene, str(tmp_path / 'expected.bag'), DEPTH)
+    process_bag(recorded, str(tmp_path / 'out.bag'), DEPTH)
+    assert messages_in(tmp_path / 'out.bag') == messages_in(tmp_path / 'expected.bag')
+
+
 def test_a_topic_to_keep_that_is_missing_is_named(session_bag, tmp_path):
     session_bag(True)
     events = process_bag(str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'),
