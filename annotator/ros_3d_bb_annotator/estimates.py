@@ -33,18 +33,18 @@ class Estimates(object):
         if positions is None:
             positions = tuple(self._document.positions(index, depth))
             measurement = self._document.measurements[index]
-            self._known[index] = measurement.detections, positions
+            self._known[index] = measurement, positions
             if measurement.truths:
                 self.update()
         return positions
 
     def known(self, index):
         """Positions as from `of`, or None if they have not been computed for the current boxes."""
-        detections, positions = self._known.get(index, (None, None))
-        current = self._document.measurements[index].detections
-        if detections is current:
+        measurement, positions = self._known.get(index, (None, None))
+        current = self._document.measurements[index]
+        if measurement is current:
             return positions
-        if detections is None or _boxes_of(detections) != _boxes_of(current):
+        if measurement is None or _input_of(measurement) != _input_of(current):
             return None
         self._known[index] = current, positions
         return positions
@@ -108,5 +108,7 @@ class Estimates(object):
         return self._likely
 
 
-def _boxes_of(detections):
-    return tuple((detection.box_px, detection.by_hand) for detection in detections)
+def _input_of(measurement):
+    """What the estimates of a measurement depend on. Another one may get the index of a deleted one."""
+    return measurement.id, measurement.depth_path, tuple(
+        (detection.box_px, detection.by_hand) for detection in measurement.detections)

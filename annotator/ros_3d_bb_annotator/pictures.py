@@ -21,27 +21,32 @@ class Pictures(NamedTuple):
 
 
 class PictureCache(object):
-    """Cache of the images of recently shown measurements."""
+    """Cache of the images of recently shown measurements. Another measurement may get the number of a deleted one."""
 
     def __init__(self, document):
         self._document, self._cache = document, collections.OrderedDict()
         self.clear = self._cache.clear
 
     def of(self, number):
-        if number in self._cache:
-            self._cache.move_to_end(number)
+        key = self._key(number)
+        if key in self._cache:
+            self._cache.move_to_end(key)
         else:
-            self._cache[number] = self._read(number)
+            self._cache[key] = self._read(number)
         while len(self._cache) > CACHE_SIZE:
             self._cache.popitem(last=False)
-        return self._cache[number]
+        return self._cache[key]
 
     def read_ahead(self, number):
         """Read the pictures of a measurement into the cache. Returns whether they were missing there."""
-        if number in self._cache:
+        if self._key(number) in self._cache:
             return False
         self.of(number)
         return True
+
+    def _key(self, number):
+        measurement = self._document.measurements[number]
+        return measurement.color_path, measurement.depth_path, measurement.id
 
     def _read(self, number):
         color, color_problem = _read_or_error(self._document.color, number)

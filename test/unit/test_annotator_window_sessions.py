@@ -1,6 +1,8 @@
 """Window of the annotator: all kinds of sessions, other programs, keys, export and analysis."""
 import os
 
+import cv2
+import numpy as np
 import pytest
 
 from ros_3d_bb_annotator import main_window
@@ -39,6 +41,19 @@ def test_changes_by_other_programs_are_shown(fast_refresh, window_on, folder):
     change_json(folder, lambda content: content['frames'].pop())
     drive.wait_for(lambda: drive.window.list.table.model().rowCount() == 4)
     assert drive.window.current == 0 and drive.window.pane.truth.fields['x'].text() == '12'
+
+
+def test_a_measurement_in_place_of_a_deleted_one_is_shown_with_its_own_image(fast_refresh, window_on, folder):
+    drive = window_on(folder)
+    drive.press((Qt.Key_End, ALT))
+    before_m = drive.document.estimates.of(3)[0][2]
+    entry = write_measurement(folder, 'm4')  # as d and s in the viewer
+    path = os.path.join(folder, entry['depth'])
+    cv2.imwrite(path, cv2.imread(path, cv2.IMREAD_UNCHANGED) - np.uint16(500))
+    change_json(folder, lambda content: content['frames'].__setitem__(3, entry))
+    drive.wait_for(lambda: drive.measurement(3).id == 'm4')
+    assert drive.document.estimates.of(3)[0][2] == pytest.approx(before_m - 0.5, abs=0.02)
+    assert drive.window.pane.depth_view.image != drive.window.pane._pictures.of(2).depth_image
 
 
 def test_an_invalid_session_gives_a_message(window_on, tmp_path):

@@ -123,6 +123,21 @@ def test_without_detector_the_boxes_in_the_bag_are_used(session_bag, tmp_path):
         assert len(boxes3d.boxes) == len(boxes2d.data) // 4
 
 
+def test_names_without_a_slash_are_those_of_the_nodes(scene, tmp_path):
+    """rosbag record stores the names of topics as they are given on its command line."""
+    recorded = rewritten(scene, tmp_path / 'in.bag', lambda topic, *rest: (topic[1:],) + rest)
+    process_bag(scene, str(tmp_path / 'expected.bag'), DEPTH)
+    process_bag(recorded, str(tmp_path / 'out.bag'), DEPTH)
+    assert messages_in(tmp_path / 'out.bag') == messages_in(tmp_path / 'expected.bag')
+
+
+def test_a_topic_to_keep_that_is_missing_is_named(session_bag, tmp_path):
+    session_bag(True)
+    events = process_bag(str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'),
+                         Settings(detector='none', keep=('tff', 'tf', 'ros_3d_bb/tracks')))
+    assert list(events.sentences.values()) == ['the bag has no topic /tff; did you mean /tf?']
+
+
 def test_topics_can_be_remapped_and_a_missing_one_is_named(scene, tmp_path):
     renamed = rewritten(scene, tmp_path / 'in.bag', lambda topic, *rest: (topic.replace('/camera/', '/front/'),) + rest)
     with pytest.raises(BagError, match='did you mean /front/color/image_raw'):
@@ -262,7 +277,10 @@ def test_broken_bags_are_named_and_the_others_are_processed(scene, broken_bags, 
 @pytest.mark.parametrize('arguments,complaint', [
     ('a.bag', 'IN and OUT'), ('a.bag a.bag --detector depth', 'also an input'), ('a.bag b.bag', 'needs --weights'),
     ('x/a.bag y/a.bag --out-dir z --detector depth', 'two inputs'),
-    ('a.bag b.bag --detector depth --remap x', 'TOPIC_OF_THE_NODES:=')])
+    ('a.bag b.bag --detector depth --remap x', 'TOPIC_OF_THE_NODES:='),
+    ('a.bag b.bag --detector depth --remap camera/colour/image_raw:=x', 'did you mean camera/color/image_raw?'),
+    ('a.bag b.bag --detector depth --cameras left,right --remap camera/color/image_raw:=x', 'the nodes have no topic'),
+    ('a.bag b.bag --detector depth --depth raw --remap camera/aligned_depth_to_color/image_raw:=x', '--remap')])
 def test_invalid_arguments_are_rejected(tmp_path, monkeypatch, capsys, arguments, complaint):
     monkeypatch.chdir(str(tmp_path))
     with pytest.raises(SystemExit) as error:

@@ -93,7 +93,8 @@ def test_the_arguments_are_listed(reader):
 
 
 def test_the_recorded_topics_are_the_inputs():
-    assert RECORD.text.split()[4:] == [COLOR_TOPIC, INFO_TOPICS[0], DEPTH_TOPIC, TF_TOPIC, STATIC_TOPIC]
+    assert RECORD.text.split()[4:] == ['/' + topic for topic in (  # rosbag stores them as given
+        COLOR_TOPIC, INFO_TOPICS[0], DEPTH_TOPIC, TF_TOPIC, STATIC_TOPIC)]
 
 
 def test_one_or_many_bags_are_processed(reader, camera_bag):

@@ -74,6 +74,18 @@ def test_a_picture_without_a_suffix_is_a_png_and_a_missing_table_is_named(bag, t
     assert sorted(os.listdir(str(tmp_path))) == ['picture.html', 'picture.png']
 
 
+def test_names_without_a_slash_are_read(bag, tmp_path):
+    """rosbag record stores the names of topics as they are given on its command line."""
+    path = str(tmp_path / 'recorded.bag')
+    with rosbag.Bag(bag) as old, rosbag.Bag(path, 'w') as new:
+        for topic, message, stamp in old.read_messages():
+            new.write(topic[1:], message, stamp)
+    assert write_report(path, str(tmp_path / 'a.png')) == write_report(bag, str(tmp_path / 'b.png'))
+    write_csv(path, str(tmp_path / 'tracks.csv'))
+    assert len((tmp_path / 'tracks.csv').read_text().splitlines()) == 10
+    assert (tmp_path / 'a.png').read_bytes() == (tmp_path / 'b.png').read_bytes()
+
+
 def test_without_ground_truth_the_tracks_are_listed(tmp_path):
     path = str(tmp_path / 'tracked.bag')
     write_bag(((stamp_ns, [pair for pair in messages if pair[0] != 'ground_truth'])

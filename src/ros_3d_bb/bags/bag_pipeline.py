@@ -15,6 +15,7 @@ from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, IMAGE_K
                                                info_of_images, uncompressed)
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC
 from ros_3d_bb.core.event_counter import EventCounter
+from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.yolov5.backends import open_detector
 from ros_3d_bb.pipeline.camera_pose import FLOOR, POSE_FITTED, POSE_TEXT, CameraPoseStage
@@ -25,6 +26,7 @@ from ros_3d_bb.pipeline.people_pipeline import (DEPTH_INFO_TOPIC, INFO_TOPIC, IN
 
 MAX_WAITING_BYTES = 2 ** 28  # messages that are read ahead
 DRIVER_TF_NS = NS  # within this time from its start, a bag contains each frame of a camera driver
+NOT_KEPT = 'topics to keep that are missing'  # event
 UNUSED = None, ''  # topic and camera of messages that the nodes do not use
 
 
@@ -196,6 +198,10 @@ def process_bag(source, target, settings=Settings()):
     events = EventCounter()
     with BagReader(source) as reader, new_bag(target, settings.compression) as bag:
         run, copy = BagRun(reader, settings, events), _copier(bag, settings)
+        for topic in settings.keep or ():
+            if not {topic, '/' + topic} & (set(reader.topics) | _outputs_of(settings)):
+                events.note(NOT_KEPT, 'the bag has no topic /%s; did you mean %s?'
+                            % (topic, nearest_name(topic, reader.topics)))
         for raw, outputs in run.outputs():
             copy(raw)
             for topic, message in outputs:
@@ -203,12 +209,17 @@ def process_bag(source, target, settings=Settings()):
     return events
 
 
-def _copier(bag, settings):
-    """Return a function that copies a Raw to a bag unchanged, except on topics that the pipeline writes."""
+def _outputs_of(settings):
+    """Return the names of the topics that the pipeline writes."""
     made = set(settings.name(topic) for topic in OUTPUTS)
     made.update(settings.name(topic, camera) for topic in OUTPUTS_OF_CAMERA for camera in settings.cameras
                 if topic != BOXES_TOPIC or settings.detector != 'none')
-    types = {}
+    return made
+
+
+def _copier(bag, settings):
+    """Return a function that copies a Raw to a bag unchanged, except on topics that the pipeline writes."""
+    made, types = _outputs_of(settings), {}
 
     def copy(raw):
         if raw.topic in made or settings.keep is not None and raw.topic.lstrip('/') not in settings.keep:

@@ -33,7 +33,10 @@ UNREAD = type('Unread', (), {'_md5sum': '*', '_full_text': ''})
 
 
 class BagReader(object):
-    """Open bag, a context manager; `topics` is {name: type}. Raises BagError if the bag cannot be opened."""
+    """Open bag, a context manager; `topics` is {name: type}. Raises BagError if the bag cannot be opened.
+
+    Names have a leading slash. `rosbag record` stores them as they are given, with or without.
+    """
 
     def __init__(self, path):
         self._path = path
@@ -42,7 +45,8 @@ class BagReader(object):
             if self._bag.version != 200:
                 raise ValueError('its format has the version %s; 200 (2.0) expected' % self._bag.version)
             connections = list(self._bag._get_connections())
-            self.topics = {connection.topic: connection.datatype for connection in connections}
+            self.topics = {_absolute(connection.topic): connection.datatype for connection in connections}
+            self._stored_names = set(connection.topic for connection in connections)
             self._unread = set(connection.md5sum for connection in connections) - set(rosbag.bag._message_types)
             rosbag.bag._message_types.update((md5sum, UNREAD) for md5sum in self._unread)
         except rosbag.ROSBagUnindexedException:
@@ -78,7 +82,10 @@ class BagReader(object):
 
     def messages(self, topics=None):
         """Yield the messages (Raw) of all or some topics in the order of recording. Raises BagError."""
-        entries = self._bag.read_messages(topics, raw=True, return_connection_header=True)
+        names = None if topics is None else [name for name in self._stored_names if _absolute(name) in topics]
+        if names == []:  # rosbag would read all topics
+            return
+        entries = self._bag.read_messages(names, raw=True, return_connection_header=True)
         while True:
             try:
                 entry = next(entries)
@@ -89,7 +96,11 @@ class BagReader(object):
                 raise
             except Exception as error:  # as above
                 raise BagError('%s is damaged (%s)' % (self._path, cause(error)))
-            yield Raw(entry.topic, datatype, md5sum, data, entry.timestamp, entry.connection_header)
+            yield Raw(_absolute(entry.topic), datatype, md5sum, data, entry.timestamp, entry.connection_header)
+
+
+def _absolute(name):
+    return '/' + name.lstrip('/')
 
 
 def message_in(raw, *kinds):

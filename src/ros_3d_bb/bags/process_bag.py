@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 import yaml
 
-from ros_3d_bb.bags.bag_pipeline import process_bag
+from ros_3d_bb.bags.bag_pipeline import NOT_KEPT, process_bag
 from ros_3d_bb.bags.bag_reader import BagError
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, STATIC_TOPIC, TF_TOPIC
 from ros_3d_bb.core.error_text import cause
-from ros_3d_bb.core.params import IMAGE_ROTATION, params_from, with_places
+from ros_3d_bb.core.params import IMAGE_ROTATION, nearest_name, params_from, with_places
 from ros_3d_bb.core.yaml_loader import load_yaml
 from ros_3d_bb.pipeline.camera_pose import FLOOR, POSE_FITTED
-from ros_3d_bb.pipeline.people_pipeline import DETECTORS, TRACKED, Settings
+from ros_3d_bb.pipeline.people_pipeline import DETECTORS, INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA, TRACKED, Settings
 
 HIGHEST_M = 100.0
 IMAGE_NODES = 'yolov5', 'depth', 'bbox3d'
@@ -86,10 +86,23 @@ def _settings_from(given):
     for node in ('depth', 'bbox3d', 'tracker'):  # one kind of depth images for all
         settings = with_params(settings, node, depth=given.depth or settings.bbox3d[0].depth)
     settings = _with_camera(settings, given)
+    _check_names(settings)
     if settings.detector == 'yolov5' and not settings.yolov5[0].weights:
         raise ValueError('--detector yolov5 needs --weights FILE, a checkpoint such as yolov5n.pt; --detector depth '
                          'needs none')
     return settings._replace(searches=given.searches or len(os.sched_getaffinity(0)))
+
+
+def _check_names(settings):
+    """Raise ValueError if a remapped topic is not one of the nodes with these cameras and this kind of depth."""
+    unmapped = settings._replace(names={})
+    topics = [unmapped.name(topic)[1:] for topic in OUTPUTS + (TF_TOPIC, STATIC_TOPIC)] + [
+        unmapped.name(topic, camera)[1:] for camera in settings.cameras
+        for topic in set(INPUTS).union(OUTPUTS_OF_CAMERA) - {TF_TOPIC, STATIC_TOPIC}]
+    for ours, theirs in settings.names.items():
+        if ours not in topics:
+            raise ValueError('--remap %s:=%s: the nodes have no topic %s; did you mean %s?'
+                             % (ours, theirs, ours, nearest_name(ours, topics)))
 
 
 def _with_camera(settings, given):
@@ -189,7 +202,7 @@ def _summary(events, detector):
 def _why_no_tracks(events, placed):
     """Return the likely cause if no track was written, as a sentence."""
     counts = events.counts
-    event = max(set(events.sentences) - {POSE_FITTED}, key=lambda each: (counts[each], each), default=None)
+    event = max(set(events.sentences) - {POSE_FITTED, NOT_KEPT}, key=lambda each: (counts[each], each), default=None)
     if event is not None and counts[event] > counts.get('images tracked', 0):
         return placed(event)
     if counts.get('images tracked') and counts.get('boxes estimated'):

@@ -66,11 +66,12 @@ def _estimates_of(session, boxes, estimator, model=None):
 
 
 def _raw_positions(session, boxes, estimator):
-    """Estimated position in each frame, (n, 3), NaN if there is no estimate."""
+    """Estimated position in each frame, (n, 3), NaN if there is no estimate, considering the boxes of other people."""
     raw_m = np.full((len(boxes), 3), np.nan)
     for number, (frame, rect_px) in enumerate(zip(session.frames, boxes)):
         if rect_px is not None:
-            box, = estimate_boxes(read_depth(frame, session), [rect_px], session.camera, estimator)
+            rects_px = [rect_px] + list(frame.boxes_px[1:])
+            box = estimate_boxes(read_depth(frame, session), rects_px, session.camera, estimator)[0]
             raw_m[number] = box.center_m if plausible(box) else np.nan
     return raw_m
 

@@ -54,7 +54,7 @@ def read_recording(bag):
     """Read a Recording from an open bag. Raises ValueError if tracks are missing, or the frames of truth differ."""
     truth, tracks, boxes, links, robot = {}, {}, {}, {}, []
     boxes_topics = topics_of_cameras(bag, BOXES_TOPIC)
-    for topic, message, _time in bag.read_messages(['/' + TRUTH_TOPIC, '/' + TRACKS_TOPIC, '/tf'] + boxes_topics):
+    for topic, message in messages_on(bag, ['/' + TRUTH_TOPIC, '/' + TRACKS_TOPIC, '/tf'] + boxes_topics):
         if topic == '/tf':
             links.update({(link.header.frame_id, link.child_frame_id): transform_from_msg(link)
                           for link in message.transforms})
@@ -101,7 +101,7 @@ def write_csv(bag_path, csv_path):
     with rosbag.Bag(bag_path) as bag, open(csv_path, 'w', newline='') as stream:
         rows = csv.writer(stream)
         rows.writerow(CSV_COLUMNS)
-        for _topic, message, _time in bag.read_messages(['/' + TRACKS_TOPIC]):
+        for _topic, message in messages_on(bag, ['/' + TRACKS_TOPIC]):
             stamp = '%d.%09d' % (message.header.stamp.secs, message.header.stamp.nsecs)
             for track in tracks_from_msg(message):
                 covariance = [''] * 3 if track.covariance is None else track.covariance[[0, 0, 1], [0, 1, 1]]
@@ -118,7 +118,20 @@ def lines_of(header, rows):
 def topics_of_cameras(bag, topic):
     """Names of a camera topic in an open bag: one name for each camera."""
     ending = topic_of('?', topic)[1:]
-    return [name for name in bag.get_type_and_topic_info().topics if name.endswith(ending)]
+    names = map(absolute, bag.get_type_and_topic_info().topics)
+    return [name for name in names if name.endswith(ending)]
+
+
+def messages_on(bag, topics):
+    """Yield (topic, message) on topics with a leading slash, which `rosbag record` stores with or without, as given."""
+    names = [name for name in bag.get_type_and_topic_info().topics if absolute(name) in topics]
+    for name, message, _time in bag.read_messages(names) if names else ():  # rosbag reads all topics for []
+        yield absolute(name), message
+
+
+def absolute(name):
+    """Topic with a leading slash."""
+    return '/' + name.lstrip('/')
 
 
 def paths_of(recording):
@@ -142,8 +155,8 @@ def panels_of(bag, recording, color_topic='', count=PANELS):
     stamps = [stamp_ns for stamp_ns in stamps if stamp_ns in recording.boxes] or stamps
     wanted = set(stamps[pick] for pick in np.linspace(0, len(stamps) - 1, count + 2)[1:-1].astype(int))
     panels = []
-    topics = [color_topic] if color_topic else topics_of_cameras(bag, COLOR_TOPIC)
-    for _topic, message, _time in bag.read_messages(topics) if topics else ():  # rosbag reads all topics for []
+    topics = [absolute(color_topic)] if color_topic else topics_of_cameras(bag, COLOR_TOPIC)
+    for _topic, message in messages_on(bag, topics):
         stamp_ns = message.header.stamp.to_nsec()
         if stamp_ns in wanted:
             boxes = recording.boxes.get(stamp_ns, np.zeros((0, 4), int))

@@ -7,7 +7,7 @@ import argparse
 import pathlib
 import sys
 
-from ros_3d_bb.estimation.error_model import write_error_model
+from ros_3d_bb.estimation.error_model import RECORDED, write_error_model
 from ros_3d_bb_lab.evaluation.noise.analysis import Inputs, analyse
 from ros_3d_bb_lab.evaluation.noise.recordings import fit_recordings
 from ros_3d_bb_lab.evaluation.noise.report import text_of, write_results
@@ -70,9 +70,9 @@ def _arguments():
     parser.add_argument('--x-variance', metavar='CSV', help='table for the variance of X, without people truncated by '
                         'the image border (default: that of --x)')
     parser.add_argument('--out', required=True, metavar='DIR', help='folder for the report; created if missing')
-    parser.add_argument('--estimator', metavar='NAME', help='for a session: foreground (default), median, or recorded '
-                        'for the stored estimates; for tables: the estimator of bbox3d_node that computed them '
-                        '(default: any)')
+    parser.add_argument('--estimator', choices=('foreground', 'median', RECORDED), help='for a session: foreground '
+                        '(default), median, or recorded for the stored estimates; for tables: the estimator of '
+                        'bbox3d_node that computed them (default: any)')
     parser.add_argument('--camera', default='unknown', help='name stored in the error model')
     arguments = parser.parse_args()
     tables = arguments.z or arguments.x or arguments.x_variance
@@ -80,6 +80,8 @@ def _arguments():
         parser.error('either a SESSION, --recordings or tables expected')
     if tables and not (arguments.z and arguments.x):
         parser.error('both --z and --x expected')
+    if arguments.estimator and arguments.recordings:
+        parser.error('--estimator is for a session and for tables')
     return arguments
 
 

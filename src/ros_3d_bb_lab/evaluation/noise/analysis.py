@@ -81,7 +81,7 @@ class Analysis(NamedTuple):
 
 def analyse(inputs):
     """Analyse `inputs`, and return an Analysis. Raises ValueError if there are too few measurements."""
-    z, x, x_variance = (axis_statistics(clusters_of(measurements, axis), degree) for measurements, axis, degree in (
+    z, x, x_variance = (axis_statistics(clusters_of(table, axis, degree + 1), degree) for table, axis, degree in (
         (inputs.z, 'Z', Z_DEGREE), (inputs.x, 'X', X_DEGREE), (inputs.x_variance, 'X', X_DEGREE)))
     names = set(os.path.basename(os.path.abspath(table.name)) for table in (inputs.z, inputs.x, inputs.x_variance))
     origin = {'source': ', '.join(sorted(names)), 'estimator': inputs.estimator, 'camera': inputs.camera,

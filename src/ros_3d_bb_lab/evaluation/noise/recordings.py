@@ -86,19 +86,38 @@ def lasting_errors(errors_m, person, stamp_ns):
     The autocovariance of the errors (n, 2) of a person is fitted by variance · exp(-lag / time), without the lag 0,
     where the independent errors add to it. Raises ValueError if too few people are detected repeatedly.
     """
-    first, second = np.triu_indices(len(person), 1)
-    lags_s = np.abs(stamp_ns[second] - stamp_ns[first]) / NS
-    together = (person[first] == person[second]) & (lags_s > 0) & (lags_s <= LONGEST_LAG_S)
-    if together.sum() < LEAST_PAIRS:
+    first, second = _pairs_of(person, stamp_ns)
+    if len(first) < LEAST_PAIRS:
         raise ValueError('%d pairs of errors of a person within %g s; at least %d expected'
-                         % (together.sum(), LONGEST_LAG_S, LEAST_PAIRS))
-    lags_s = lags_s[together]
-    products_m2 = (errors_m[first[together]] * errors_m[second[together]]).mean(axis=1)
-    shapes = np.exp(-lags_s / TIMES_S[:, None])
-    variances_m2 = np.maximum((shapes * products_m2).sum(axis=1) / (shapes ** 2).sum(axis=1), 0)
-    costs = ((products_m2 - variances_m2[:, None] * shapes) ** 2).sum(axis=1)
-    best = int(np.argmin(costs))
-    return float(np.sqrt(variances_m2[best])), float(TIMES_S[best])
+                         % (len(first), LONGEST_LAG_S, LEAST_PAIRS))
+    lags_s = (stamp_ns[second] - stamp_ns[first]) / NS
+    products_m2 = (errors_m[first] * errors_m[second]).mean(axis=1)
+    best_cost, variance_m2, best_time_s = np.inf, 0.0, 0.0
+    for time_s in TIMES_S:
+        shape = np.exp(-lags_s / time_s)
+        fitted_m2 = max(shape.dot(products_m2) / shape.dot(shape), 0.0)
+        cost = ((products_m2 - fitted_m2 * shape) ** 2).sum()
+        if cost < best_cost:
+            best_cost, variance_m2, best_time_s = cost, fitted_m2, time_s
+    return float(np.sqrt(variance_m2)), float(best_time_s)
+
+
+def _pairs_of(person, stamp_ns):
+    """Indices (m,) and (m,) of the earlier and later error of a person, more than 0 and at most LONGEST_LAG_S apart.
+
+    Memory grows with the number of these pairs, not with the square of the number of errors.
+    """
+    order = np.lexsort((stamp_ns, person))
+    pairs = [(order[:0], order[:0])]
+    for step in range(1, len(order)):
+        first, second = order[:-step], order[step:]
+        lags_ns = stamp_ns[second] - stamp_ns[first]
+        near = (person[first] == person[second]) & (lags_ns <= LONGEST_LAG_S * NS)
+        if not near.any():  # with more steps between them, they are farther apart
+            break
+        near &= lags_ns > 0
+        pairs.append((first[near], second[near]))
+    return tuple(np.concatenate(indices) for indices in zip(*pairs))
 
 
 def detection_range(range_m, detected):

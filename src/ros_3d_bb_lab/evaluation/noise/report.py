@@ -233,9 +233,9 @@ def _between_text(share, axis, other):
 
 
 def _spread_text(spread):
-    if spread.growth == 0:
+    if spread.growth == spread.near_m2 == 0:
         return '%.4f' % spread.constant_m
-    return '√(%.4f² + (%.4f z²)² + (%.4f / z)²)' % spread
+    return '√(%.4f² + (%.5f z²)² + (%.4f / z)²)' % spread
 
 
 def _count(axis):

@@ -58,9 +58,6 @@ class AxisStatistics(NamedTuple):
 
 def axis_statistics(clusters, degree):
     """Compute the statistics of clusters, and fit a polynomial to their means with equal weights (as in the thesis)."""
-    if len(clusters) <= degree:
-        raise ValueError('%d clusters; at least %d needed for a polynomial of degree %d'
-                         % (len(clusters), degree + 1, degree))
     described = tuple(cluster_statistics(cluster) for cluster in clusters)
     poly = np.polyfit([cluster.truth_m for cluster in described], [cluster.mean_m for cluster in described], degree)
     return AxisStatistics(tuple(poly.tolist()), described)

@@ -78,15 +78,15 @@ class Cluster(NamedTuple):
     error_m: np.ndarray
 
 
-def clusters_of(measurements, axis):
+def clusters_of(measurements, axis, least=2):
     """Group the errors of an axis, 'X' or 'Z', by true value. Clusters with fewer than 3 measurements are left out.
 
-    Raises ValueError if fewer than two clusters remain.
+    Raises ValueError if fewer than `least` clusters remain.
     """
     clusters = [cluster for cluster in _groups_of(measurements, axis) if len(cluster.error_m) >= LEAST_IN_CLUSTER]
-    if len(clusters) < 2:
-        raise ValueError('%s: at least %d measurements at each of several values of %s true needed; there are %s' % (
-            measurements.name, LEAST_IN_CLUSTER, axis, ', '.join(
+    if len(clusters) < least:
+        raise ValueError('%s: at least %d measurements at each of %d values of %s true needed; there are %s' % (
+            measurements.name, LEAST_IN_CLUSTER, least, axis, ', '.join(
                 '%d at %g m' % (len(group.error_m), group.truth_m)
                 for group in _groups_of(measurements, axis)) or 'none'))
     return clusters
