@@ -178,19 +178,25 @@ def with_stamp(message, stamp):
 
 
 def camera_from_msg(message):
-    """Convert a sensor_msgs/CameraInfo to a camera model with intrinsics and lens distortion.
+    """Convert a sensor_msgs/CameraInfo to a camera model with intrinsics and lens distortion, of the images that it
+    belongs to: K is that of the full resolution, of which `roi` and `binning` are a part.
 
     realsense2_camera labels the inverse Brown-Conrady model of librealsense as plumb_bob; the two differ by a few
     hundredths of a pixel. Raises ValueError if K is zero, as for an uncalibrated camera, or as `Camera`.
     """
-    return _camera_of(message.width, message.height, tuple(message.K), message.distortion_model, tuple(message.D))
+    roi = message.roi
+    part = (roi.x_offset, roi.y_offset, roi.width or message.width, roi.height or message.height)
+    binning = message.binning_x or 1, message.binning_y or 1
+    return _camera_of(part, binning, tuple(message.K), message.distortion_model, tuple(message.D))
 
 
 @functools.lru_cache(maxsize=16)  # cameras send their calibration with each image
-def _camera_of(width, height, matrix, distortion_model, distortion):
+def _camera_of(part, binning, matrix, distortion_model, distortion):
     if not any(matrix):
         raise ValueError('it is empty (all of K is zero): the driver does not know the calibration of the camera')
-    return Camera(width, height, matrix[0], matrix[4], matrix[2], matrix[5], distortion_model, distortion)
+    (left, top, width, height), (binning_x, binning_y) = part, binning
+    return Camera(width // binning_x, height // binning_y, matrix[0] / binning_x, matrix[4] / binning_y,
+                  (matrix[2] - left) / binning_x, (matrix[5] - top) / binning_y, distortion_model, distortion)
 
 
 def transform_from_msg(message):
