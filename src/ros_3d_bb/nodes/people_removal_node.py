@@ -41,7 +41,8 @@ class PeopleRemovalNode(object):
 
     The outputs are for costmaps, SLAM and localisation, which take people for obstacles that stay. People are where
     their tracks predict them at the stamp of the measurements. Without tracks for ~timeout, a transform, or the
-    camera_info of depth images, measurements pass as they are, and so do those of another layout. Parameters: config/people_removal.yaml.
+    camera_info of depth images, measurements pass as they are, and so do those of another layout.
+    Parameters: config/people_removal.yaml.
 
     Subscribes
     ----------
