@@ -313,6 +313,9 @@ def test_with_stamp_changes_only_the_stamp():
     assert (boxes.boxes.tolist(), boxes.stamp_ns, boxes.frame_id) == ([[1, 2, 3, 4]], 7 * NS + 5, 'camera')
     assert boxes.labels == ('dog',) and boxes.scores.tolist() == [0.5]
     assert 'classes' not in with_stamp(boxes2d_to_msg([(1, 2, 3, 4)], header(1)), stamp).layout.dim[0].label
+    assert boxes.image_size is None
+    sized = with_stamp(boxes2d_to_msg([(1, 2, 3, 4)], header(1), image_size=(640, 480)), stamp)
+    assert boxes2d_from_msg(on_the_wire(sized)).image_size == (640, 480)
     depth = DepthImage(np.ones((2, 2), np.uint16), 0.001)
     chain = [('map', 'odom', np.eye(4)), ('odom', 'camera', np.eye(4))]
     camera, color = Camera(2, 2, 1.0, 1.0, 0.5, 0.5), np.zeros((2, 2, 3), np.uint8)
