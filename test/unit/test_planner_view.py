@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.planning.planner_view import (covariances_after, footprint_points, in_frame, position_after,
-                                             predicted_to, usable_tracks)
+                                             predicted_to, usable_tracks, with_usable_covariances)
 from ros_3d_bb.tracking.types import OUT_OF_VIEW
 from ros_3d_bb_lab.simulation.simulator import upright
 from support.tracks import track_at
@@ -46,8 +46,7 @@ def test_footprints_end_where_the_prediction_is_uncertain():
 
 @pytest.mark.parametrize('changed', [{'position_m': np.array([np.nan, 0, 1])}, {'velocity_mps': np.full(3, np.inf)},
                                      {'size_m': np.array([0, 0, 1.7])}, {'size_m': np.array([0.5, 0.5, 10.0])},
-                                     {'prediction_m': np.full((1, 3), np.nan)}, {'prediction_step_s': 0.0},
-                                     {'covariance': np.diag([1, 1, 1, 1, 1, np.nan])}])
+                                     {'prediction_m': np.full((1, 3), np.nan)}, {'prediction_step_s': 0.0}])
 def test_an_invalid_track_does_not_affect_the_others(changed):
     good = [track_at([number, 0, 1], [1, 0, 0], number=number) for number in (1, 2)]
     broken = track_at([0, 0, 1], [1, 0, 0], number=7)._replace(**changed)
@@ -57,6 +56,18 @@ def test_an_invalid_track_does_not_affect_the_others(changed):
     for wrong in ({'score': np.nan}, {'score': 1.5}, {'label': 'a;b'}, {'label': u'\u9f8d'}):
         usable, faults = usable_tracks([good[0], good[1]._replace(**wrong)])
         assert usable == good[:1] and len(faults) == 1
+
+
+@pytest.mark.parametrize('covariance', [np.diag([1, 1, 1, 1, 1, np.nan]), np.full((6, 6), 1e300),
+                                        np.diag([1, -0.1, 1, 1, 1, 1])])
+def test_a_person_whose_covariance_is_invalid_stays(covariance):
+    ahead_m2 = np.tile(np.eye(3), (8, 1, 1))
+    wrong = track_at([1, 0, 1], [1, 0, 0], covariance=covariance)._replace(prediction_covariance_m2=ahead_m2)
+    good = wrong._replace(id=2, covariance=np.eye(6))
+    tracks, faults = with_usable_covariances(usable_tracks([wrong, good, wrong._replace(covariance=None)])[0])
+    assert [track.covariance is None for track in tracks] == [True, False, True] and len(faults) == 1
+    assert tracks[1].prediction_covariance_m2 is ahead_m2
+    assert np.isfinite(covariances_after(tracks[0], [0.0, 3.0])).all()
 
 
 coordinates = st.floats(-1e6, 1e6)

@@ -89,6 +89,19 @@ def test_a_person_before_a_low_camera_stays_while_the_place_is_occupied(views):
     assert free[-1] == []
 
 
+@pytest.mark.parametrize('speed_mps', [0.5, 1.0, 1.5])
+def test_a_person_who_walks_up_to_a_low_camera_and_stops_stays_before_it(speed_mps):
+    """The detector finds the person up to 1.3 m. Before, the track went on through the robot, which then drove on."""
+    tracker = Tracker()
+    for number in range(10 * 30):
+        x_m = max(3.0 - speed_mps * number / 30, 0.8)
+        stamp_ns, view = START_NS + number * PERIOD_NS, low_camera(x_m - 0.1)
+        objects = tracker.update(stamp_ns, shown(view, (x_m, 0.0)) if x_m > 1.3 else [], view)
+    track, = objects
+    assert (track.id, track.status) == (1, OCCLUDED) and 0.5 < track.position_m[0] <= 0.9
+    assert np.linalg.norm(track.velocity_mps) < 0.05 and 0.5 < track.prediction_m[-1, 0] <= 0.9
+
+
 def test_a_wall_behind_a_person_who_has_left_does_not_keep_the_track_for_ever():
     """The person stood 0.3 m before it. Afterwards the robot, which stands, sees only the wall."""
     tracker, wall = Tracker(), [low_camera(1.3)]

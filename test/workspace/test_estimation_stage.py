@@ -1,4 +1,5 @@
 """Estimation stage: effect of one invalid 2D box on the others of its image, and the parameter ~error_model."""
+import contextlib
 import os
 
 import numpy as np
@@ -60,8 +61,8 @@ class Estimation(object):
     def add_depth(self, depth, header=HEADER, encoding='32FC1'):
         self._source.add_depth(fill_image(Image(header=header), depth, encoding), 0)
 
-    def add_boxes(self, rects_px, labels=None, scores=None, header=HEADER):
-        self._source.add_boxes(boxes2d_to_msg(np.array(rects_px), header, labels, scores), 0)
+    def add_boxes(self, rects_px, labels=None, scores=None, header=HEADER, image_size=None):
+        self._source.add_boxes(boxes2d_to_msg(np.array(rects_px), header, labels, scores, image_size), 0)
 
 
 def test_each_image_has_the_tilt_of_the_camera_at_its_time():
@@ -72,6 +73,18 @@ def test_each_image_has_the_tilt_of_the_camera_at_its_time():
         run.add_boxes([PERSON_PX])
     lengths_m = [box.center_m[2] for box in run.boxes3d]
     assert lengths_m[0] == lengths_m[1] == lengths_m[3] != lengths_m[2]
+
+
+@pytest.mark.parametrize('image_size, found', [(None, 1), ((640, 480), 1), ((320, 240), 0)])
+def test_boxes_in_a_resized_image_are_rejected(image_size, found):
+    """Their pixels are not those of the camera_info."""
+    run = Estimation(Bbox3dParams(), EventCounter())
+    run.add_depth(scene(6.0))
+    with contextlib.ExitStack() as stack:
+        if not found:
+            stack.enter_context(pytest.raises(ValueError, match='320 x 240 pixels, its camera_info on .* 640 x 480'))
+        run.add_boxes([PERSON_PX], image_size=image_size)
+    assert len(run.boxes3d) == found
 
 
 def test_boxes_have_the_stamp_of_their_depth_image_which_is_used_once():

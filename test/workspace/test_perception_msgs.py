@@ -191,6 +191,18 @@ def test_3d_boxes_survive(covariance_m2):
     assert back.rect_px == other.rect_px == sent.rect_px
 
 
+def test_intrinsics_are_those_of_the_cropped_and_decimated_images():
+    """As of the nodelet crop_decimate: from column 200 and row 40 on, every second pixel of 400 x 300."""
+    info = CameraInfo(width=640, height=480, K=[600, 0, 320, 0, 610, 240, 0, 0, 1])
+    whole = camera_from_msg(info)
+    info.binning_x = info.binning_y = 2
+    assert camera_from_msg(info)[:6] == (320, 240, 300, 305, 160, 120)
+    info.roi.x_offset, info.roi.y_offset, info.roi.width, info.roi.height = 200, 40, 400, 300
+    part = camera_from_msg(info)
+    assert part[:2] == (200, 150)
+    np.testing.assert_allclose(part.deproject([[5, 8]], 2.0), whole.deproject([[200 + 2 * 5, 40 + 2 * 8]], 2.0))
+
+
 @pytest.mark.parametrize('wrong', [
     {'x_m': float('nan')}, {'x_m': float('inf')}, {'x_m': 1e300}, {'width_m': 0.0}, {'width_m': -1.0},
     {'width_m': float('nan')}, {'width_m': 10.0}, {'width_m': 1e6}, {'height_m': 10.93},
@@ -301,6 +313,9 @@ def test_with_stamp_changes_only_the_stamp():
     assert (boxes.boxes.tolist(), boxes.stamp_ns, boxes.frame_id) == ([[1, 2, 3, 4]], 7 * NS + 5, 'camera')
     assert boxes.labels == ('dog',) and boxes.scores.tolist() == [0.5]
     assert 'classes' not in with_stamp(boxes2d_to_msg([(1, 2, 3, 4)], header(1)), stamp).layout.dim[0].label
+    assert boxes.image_size is None
+    sized = with_stamp(boxes2d_to_msg([(1, 2, 3, 4)], header(1), image_size=(640, 480)), stamp)
+    assert boxes2d_from_msg(on_the_wire(sized)).image_size == (640, 480)
     depth = DepthImage(np.ones((2, 2), np.uint16), 0.001)
     chain = [('map', 'odom', np.eye(4)), ('odom', 'camera', np.eye(4))]
     camera, color = Camera(2, 2, 1.0, 1.0, 0.5, 0.5), np.zeros((2, 2, 3), np.uint8)

@@ -200,7 +200,7 @@ def test_tracks_are_withheld_while_a_camera_is_silent():
     assert rig.send(START_NS, 'front') is None
     assert rig.send(START_NS + NS // 10, 'rear') is not None and rig.send(START_NS + NS // 5, 'front') is not None
     assert rig.send(START_NS + 7 * NS // 10, 'front') is None
-    assert 'no boxes of rear within the last 0.5 s' in rig.events.sentences['tracks withheld']
+    assert 'no boxes of rear were tracked within the last 0.5 s' in rig.events.sentences['tracks withheld']
     assert rig.send(START_NS + 8 * NS // 10, 'rear') is not None
 
 

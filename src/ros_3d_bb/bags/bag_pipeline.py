@@ -181,9 +181,9 @@ class BagRun(object):
         self._events.count('messages on %s' % raw.topic)
         if search is not None:
             with self._pipeline.detecting():
-                _image, detections = search.result()
+                pixels, detections = search.result()
                 self._events.count('images processed')
-                self._pipeline.add_detections(image.header, detections, self._detector.names, now_ns, camera)
+                self._pipeline.add_detections(image.header, pixels, detections, self._detector.names, now_ns, camera)
         elif topic != TF_TOPIC and (topic != COLOR_TOPIC or self._detector is None):
             with self._events.rejecting('messages on %s' % raw.topic):
                 self._pipeline.take(topic, message_in(raw, *INPUTS[topic]), now_ns, camera)

@@ -26,13 +26,15 @@ ROUNDING = 1e-9  # tolerance of eigenvalues of a covariance, relative to its lar
 MAX_BOXES = 1000  # more boxes in one image are an error of the publisher and would stall the pipeline
 # Classes and scores follow the frame in the label of 2D boxes; frames may contain semicolons.
 CLASSES = re.compile(r'(?:;classes=([^;]*))?(?:;scores=([^;]*))?\Z')
+CORNERS = 'x1 y1 x2 y2'  # label of the second dimension, followed by the size of the image if it is known
+IMAGE_SIZE = re.compile(r' in ([0-9]{1,9}) x ([0-9]{1,9})\Z')
 
 
 class Boxes2D(NamedTuple):
     """The 2D boxes of one image: (n, 4) integer pixels x1, y1, x2, y2, and the stamp and frame of the image.
 
     `stamp_ns` is None for a plain array, which does not identify its image. `labels` are the class names of the boxes;
-    `scores` (n,) are 0..1, 0 if unknown.
+    `scores` (n,) are 0..1, 0 if unknown. `image_size` is the (width, height) of the image, None if unknown.
     """
 
     boxes: np.ndarray
@@ -40,6 +42,7 @@ class Boxes2D(NamedTuple):
     frame_id: str
     labels: Tuple[str, ...]
     scores: np.ndarray
+    image_size: Optional[Tuple[int, int]] = None
 
 
 def time_from(stamp_ns):
@@ -75,12 +78,13 @@ def check_transforms(message):
                              % (transform.child_frame_id, transform.header.stamp.secs))
 
 
-def boxes2d_to_msg(boxes, header, labels=None, scores=None):
+def boxes2d_to_msg(boxes, header, labels=None, scores=None, image_size=None):
     """Convert 2D boxes to std_msgs/Int32MultiArray, with the stamp and frame of their image in the layout.
 
     `boxes` (n, 4) are x1, y1, x2, y2 in pixels, which are rounded to integers; `header` is that of the image. `labels`
     are the class names of the boxes, and `scores` are 0..1; both follow in the layout if they are given. Characters of
-    class names that the layout cannot carry are replaced (`labels.usable_label`).
+    class names that the layout cannot carry are replaced (`labels.usable_label`). The (width, height) of the image
+    shows whether it has the size of the camera_info.
     """
     message = Int32MultiArray(data=np.rint(boxes).astype(int).ravel().tolist())
     label = 'boxes;stamp=%d.%09d;frame=%s' % (header.stamp.secs, header.stamp.nsecs, header.frame_id)
@@ -89,17 +93,19 @@ def boxes2d_to_msg(boxes, header, labels=None, scores=None):
     if scores is not None and len(boxes):
         label += ';scores=' + ','.join('%.3g' % score for score in scores)
     message.layout.dim = [MultiArrayDimension(label=label, size=len(boxes), stride=4 * len(boxes)),
-                          MultiArrayDimension(label='x1 y1 x2 y2', size=4, stride=4)]
+                          MultiArrayDimension(label=CORNERS, size=4, stride=4)]
+    if image_size is not None:
+        message.layout.dim[1].label += ' in %d x %d' % tuple(image_size)
     return message
 
 
-def detections2d_to_msg(detections, names, header):
+def detections2d_to_msg(detections, names, header, image_size):
     """Convert `detection.boxes.Detections` to std_msgs/Int32MultiArray as `boxes2d_to_msg`.
 
     `names` are the class names by number.
     """
     return boxes2d_to_msg(detections.boxes, header, [names[number] for number in detections.classes],
-                          detections.scores)
+                          detections.scores, image_size)
 
 
 def boxes2d_from_msg(message):
@@ -125,17 +131,24 @@ def boxes2d_from_msg(message):
     for field in label[:classes_and_scores.start()].split(';', 2):
         name, _equals, value = field.partition('=')
         fields[name] = value
+    image_size = _image_size(message)
     if 'stamp' not in fields:
-        return Boxes2D(boxes, None, '', labels, scores)
+        return Boxes2D(boxes, None, '', labels, scores, image_size)
     secs, _dot, nsecs = fields['stamp'].partition('.')
     if not (secs.isdigit() and nsecs.isdigit() and len(nsecs) == 9):
         raise ValueError('2D boxes have the label %r; boxes;stamp=<secs>.<nsecs, 9 digits>;frame=<frame_id> expected'
                          % label)
-    return Boxes2D(boxes, int(secs) * NS + int(nsecs), fields.get('frame', ''), labels, scores)
+    return Boxes2D(boxes, int(secs) * NS + int(nsecs), fields.get('frame', ''), labels, scores, image_size)
 
 
 def _layout_label(message):
     return message.layout.dim[0].label if message.layout.dim else ''
+
+
+def _image_size(message):
+    """The (width, height) in the label of the second dimension, None without."""
+    found = IMAGE_SIZE.search(message.layout.dim[1].label) if len(message.layout.dim) > 1 else None
+    return found and (int(found.group(1)), int(found.group(2)))
 
 
 def _labels_and_scores(classes, scores, count):
@@ -171,6 +184,7 @@ def with_stamp(message, stamp):
         boxes = boxes2d_from_msg(message)
         stamped = boxes2d_to_msg(boxes.boxes, Header(stamp=stamp, frame_id=boxes.frame_id))
         stamped.layout.dim[0].label += CLASSES.search(_layout_label(message)).group()
+        stamped.layout.dim[1:] = message.layout.dim[1:]
         return stamped
     for part in getattr(message, 'transforms', [message]):
         part.header.stamp = stamp
@@ -178,19 +192,25 @@ def with_stamp(message, stamp):
 
 
 def camera_from_msg(message):
-    """Convert a sensor_msgs/CameraInfo to a camera model with intrinsics and lens distortion.
+    """Convert a sensor_msgs/CameraInfo to a camera model with intrinsics and lens distortion, of the images that it
+    belongs to: K is that of the full resolution, of which `roi` and `binning` are a part.
 
     realsense2_camera labels the inverse Brown-Conrady model of librealsense as plumb_bob; the two differ by a few
     hundredths of a pixel. Raises ValueError if K is zero, as for an uncalibrated camera, or as `Camera`.
     """
-    return _camera_of(message.width, message.height, tuple(message.K), message.distortion_model, tuple(message.D))
+    roi = message.roi
+    part = (roi.x_offset, roi.y_offset, roi.width or message.width, roi.height or message.height)
+    binning = message.binning_x or 1, message.binning_y or 1
+    return _camera_of(part, binning, tuple(message.K), message.distortion_model, tuple(message.D))
 
 
 @functools.lru_cache(maxsize=16)  # cameras send their calibration with each image
-def _camera_of(width, height, matrix, distortion_model, distortion):
+def _camera_of(part, binning, matrix, distortion_model, distortion):
     if not any(matrix):
         raise ValueError('it is empty (all of K is zero): the driver does not know the calibration of the camera')
-    return Camera(width, height, matrix[0], matrix[4], matrix[2], matrix[5], distortion_model, distortion)
+    (left, top, width, height), (binning_x, binning_y) = part, binning
+    return Camera(width // binning_x, height // binning_y, matrix[0] / binning_x, matrix[4] / binning_y,
+                  (matrix[2] - left) / binning_x, (matrix[5] - top) / binning_y, distortion_model, distortion)
 
 
 def transform_from_msg(message):

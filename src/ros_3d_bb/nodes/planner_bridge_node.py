@@ -6,17 +6,18 @@ import rospy
 import tf2_ros
 from std_msgs.msg import Header
 
-from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, stamp_of, time_from, tracks_from_msg
+from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, stamp_of, time_from
 from ros_3d_bb.core.object_classes import read_object_classes
 from ros_3d_bb.core.params import CLASSES_FILE, LARGEST, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
+from ros_3d_bb.nodes.common.latest_tracks import received_tracks
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import subscribe
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.planning.planner_outputs import outputs_from
-from ros_3d_bb.planning.planner_view import SAME_FRAME, predicted_to, rounding_m, usable_tracks, with_class_widths
+from ros_3d_bb.planning.planner_view import SAME_FRAME, predicted_to, rounding_m, with_class_widths
 
 CHECK_PERIOD_S = 0.1  # between checks of ~timeout, whatever ~resend_period is; chosen: a tenth of the default timeout
 MAX_ROUNDING_M = 0.005  # largest rounding error of a coordinate: a tenth of a typical costmap cell
@@ -159,8 +160,7 @@ class PlannerBridgeNode(object):
         if abs(now_ns - stamp_ns) > self._params.timeout * NS:
             raise ValueError('their stamp is %.3f s before the clock, more than ~timeout (%g s); a bag needs '
                              'use_sim_time' % ((now_ns - stamp_ns) / NS, self._params.timeout))
-        tracks, faults = usable_tracks(tracks_from_msg(message))
-        self._diagnostics.count_dropped('tracks', faults)
+        tracks = received_tracks(message, self._diagnostics)
         return ReceivedTracks(stamp_ns, now_ns, message.header.frame_id, with_class_widths(tracks, self._classes),
                               self._transforms_at(message.header))
 

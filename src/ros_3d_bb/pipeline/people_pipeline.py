@@ -175,10 +175,11 @@ class PeoplePipeline(object):
         else:
             source.add_boxes(message, now_ns)
 
-    def add_detections(self, header, detections, names, now_ns, camera=''):
-        """Process the Detections in a received colour image with the given header; `names` are those of the classes."""
+    def add_detections(self, header, image, detections, names, now_ns, camera=''):
+        """Process the Detections in a received colour image (height, width, 3) with the given header; `names` are those
+        of the classes."""
         self._now_ns = now_ns
-        message = self._boxes2d(camera, header, detections, names)
+        message = self._boxes2d(camera, header, image, detections, names)
         if message is not None:
             self._sources[camera].add_boxes(message, now_ns)
 
@@ -209,16 +210,16 @@ class PeoplePipeline(object):
         detections = self._detection_stages[camera].detect(frame)
         if detections is None:
             return
-        message = self._boxes2d(camera, header, detections, DepthDetectionStage.names)
+        message = self._boxes2d(camera, header, frame.received_color, detections, DepthDetectionStage.names)
         if message is not None:
             self._events.count('arrays of 2D boxes')
             self._estimate_and_track(camera, frame, boxes2d_from_msg(message))
 
-    def _boxes2d(self, camera, header, detections, names):
+    def _boxes2d(self, camera, header, image, detections, names):
         """Return the message of Detections, None if it is not published."""
         if not len(detections.boxes) and not self._settings.publish_empty:
             return None
-        message = detections2d_to_msg(detections, names, header)
+        message = detections2d_to_msg(detections, names, header, image.shape[1::-1])
         self._results.on_boxes2d(camera, message)
         return message
 

@@ -98,7 +98,8 @@ class RgbdSource(object):
         Raises
         ------
         ValueError
-            If an image cannot be read, or the depth image has another size than the camera or cannot be registered.
+            If an image cannot be read, the colour image has another size than its camera_info, or the depth image has
+            another size than the camera or cannot be registered.
         """
         received = imgmsg_to_depth(depth_msg, self._params.depth_scale, check_unit=True)
         depth, frame_id = self._aligned(received, depth_msg.header.frame_id, camera)
@@ -106,6 +107,10 @@ class RgbdSource(object):
         if stamp_ns is None:
             stamp_ns = depth_stamp_ns
         color = None if isinstance(trigger, Boxes2D) else imgmsg_to_rgb(trigger)
+        size = trigger.image_size if color is None else color.shape[1::-1]
+        if size not in (None, (camera.width, camera.height)):
+            raise ValueError('the colour image has %d x %d pixels, its camera_info on %s is for %d x %d: remap the '
+                             'camera_info of this image' % (size + (self._info_topic, camera.width, camera.height)))
         frame = RgbdFrame(stamp_ns, depth_stamp_ns, frame_id, camera, depth, received.scale_m, color,
                           camera_from_floor=self._camera_from_floor(frame_id))
         return upright_frame(frame, self._params.image_rotation)

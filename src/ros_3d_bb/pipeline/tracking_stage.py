@@ -214,8 +214,9 @@ class TrackingStage(object):
         self._boxes_ns[camera] = stamp_ns
         silent = self._silent_cameras(newest_ns)
         if silent:
-            self._events.warn('tracks withheld', 'no boxes of %s within the last %g s (~camera_timeout): no tracks are '
-                              'published, so that planners stop' % (', '.join(silent), self._params.camera_timeout))
+            self._events.warn('tracks withheld', 'no boxes of %s were tracked within the last %g s (~camera_timeout): '
+                              'no tracks are published, so that planners stop'
+                              % (', '.join(silent), self._params.camera_timeout))
             return
         self._on_tracks(tracks, Header(stamp=time_from(newest_ns), frame_id=self._params.target_frame))
 

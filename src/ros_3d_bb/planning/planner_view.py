@@ -12,6 +12,7 @@ from ros_3d_bb.tracking.types import OUT_OF_VIEW
 SWATH_STEP_S = 0.1  # a person at 3 m/s moves 0.3 m, less than a body's width, so that the footprints overlap
 MAX_STD_M = 0.5  # predicted positions that are less certain are not marked
 MAX_STD_UNSEEN_M = 0.2  # the same for the positions of walking people out of view
+ROUNDING = 1e-6  # of eigenvalues of a covariance, relative to the largest one if that exceeds 1
 SAME_FRAME = np.eye(4)
 LOWEST, HIGHEST = 0.25, 0.75  # fractions of a cylinder's height: off the floor and below 2 m, the limit of costmaps
 
@@ -30,15 +31,31 @@ def _fault_of(track):
         return ('track %d has position %s, velocity %s, size %s and prediction %s; finite numbers and a size of more '
                 'than 0 and less than %g m expected' % (track.id, track.position_m, track.velocity_mps, track.size_m,
                                                         track.prediction_m.tolist(), MAX_SIZE_M))
-    if track.covariance is not None and not ((np.abs(track.covariance) < MAX_COORDINATE_M).all() and (
-            np.abs(track.prediction_covariance_m2) < MAX_COORDINATE_M).all()):
-        return 'track %d has a covariance that is not finite' % track.id
     if len(track.prediction_m) and not track.prediction_step_s > 0:
         return ('track %d has predictions in steps of %g s; a positive step expected'
                 % (track.id, track.prediction_step_s))
     if label_fault(track.label) or score_fault(track.score):
         return 'track %d has %s' % (track.id, label_fault(track.label) or score_fault(track.score))
     return ''
+
+
+def with_usable_covariances(tracks):
+    """Make covariances unknown that are not finite or have negative variances: people without one are better than no
+    people. Returns the tracks, and a description of each fault."""
+    are_usable = [track.covariance is None or _is_usable(track) for track in tracks]
+    usable = [track if is_usable else track._replace(covariance=None, prediction_covariance_m2=None)
+              for track, is_usable in zip(tracks, are_usable)]
+    return usable, ['the covariance of track %d is not finite, or has a negative variance: it counts as unknown'
+                    % track.id for track, is_usable in zip(tracks, are_usable) if not is_usable]
+
+
+def _is_usable(track):
+    blocks_m2 = np.concatenate((track.covariance[:3, :3][np.newaxis], track.covariance[3:, 3:][np.newaxis],
+                                track.prediction_covariance_m2))
+    if not (np.abs(blocks_m2) < MAX_COORDINATE_M).all():
+        return False
+    variances_m2 = np.linalg.eigvalsh(blocks_m2)
+    return bool((variances_m2[:, 0] >= -ROUNDING * np.maximum(variances_m2[:, 2], 1)).all())
 
 
 def with_class_widths(tracks, classes):

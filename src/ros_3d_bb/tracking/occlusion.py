@@ -4,13 +4,14 @@ The latest image of each camera classifies each undetected track, and the best r
 cannot see is therefore neither out of view nor missed while another camera detects it, sees it occluded or should
 detect it. A camera that stops sending images is ignored after a short time.
 """
+import math
 from typing import NamedTuple, Optional, Tuple
 
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.kalman_filter import State
-from ros_3d_bb.tracking.track import PRESENT, SEEN
+from ros_3d_bb.tracking.track import PRESENT, SEEN, STAYED
 from ros_3d_bb.tracking.types import NEARER_M, OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView, wrapped
 
 # All are chosen; `./run bench scenes` and `./run bench tracking` show the effect of others.
@@ -25,10 +26,12 @@ HIDDEN_BEHIND_M = 0.5  # measured depth nearer than the person by more than this
 HIDDEN_SHARE = 0.5
 ACROSS, ALONG = np.meshgrid((-0.6, 0, 0.6), (-0.8, -0.4, 0, 0.4, 0.8))  # depth sample points, in half extents
 
-STATUS = {VISIBLE: OCCLUDED, OCCLUDED: OCCLUDED, OUT_OF_VIEW: OUT_OF_VIEW, PRESENT: OCCLUDED, SEEN: VISIBLE}
+STATUS = {VISIBLE: OCCLUDED, OCCLUDED: OCCLUDED, OUT_OF_VIEW: OUT_OF_VIEW, PRESENT: OCCLUDED,
+          STAYED: OCCLUDED, SEEN: VISIBLE}
 RECENT_NS = NS  # a camera whose latest image is older is ignored
 BEHIND_M = 0.45  # upper bound of the position's standard deviation of a person who stays behind an occluder
 PRESENT_M = 0.3  # the same of one whose place is occupied
+STOPPING_S = 0.5  # time constant of the velocity of a person who does not come as near as predicted
 PRESENT_NS = 30 * NS  # without a detection for longer, what occupies the place may be a wall, which would stay for ever
 OCCLUDING_S = 0.3  # a track missed for longer does not occlude others
 
@@ -55,7 +58,7 @@ def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_p
 
     An occluded person who is predicted to reappear but is not detected is assumed to stay behind the occluder: the
     track keeps its previous position. A person whose place is occupied does not become less certain than `PRESENT_M`,
-    until `PRESENT_NS` after the latest detection.
+    until `PRESENT_NS` after the latest detection, and does not come nearer than what occupies it.
 
     `missed` are those of the `tracks` that are not detected; they are predicted to the stamp of the image. `before` are
     the tracks after the previous image. `cameras` maps each camera to its CameraState; `camera` is that of the image,
@@ -77,19 +80,30 @@ def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_p
     for track in missed:
         track.set_visibility(camera, seen[track.id])
         best = min([seen[track.id]] + [track.visibility.get(name, OUT_OF_VIEW) for name in others])
-        if best == PRESENT and not (track.is_confirmed and image.stamp_ns - track.last_ns <= PRESENT_NS):
-            best = OUT_OF_VIEW
-        if best == PRESENT:
+        is_there = best in (PRESENT, STAYED)
+        if is_there and not (track.is_confirmed and image.stamp_ns - track.last_ns <= PRESENT_NS):
+            best, is_there = OUT_OF_VIEW, False
+        if best == STAYED:
+            _stop(track, before[track.id].state, math.exp(-observed_s / STOPPING_S))
+        elif best == PRESENT:
             track.state = State(*(track.state[:4] + _bounded(track.state, before[track.id].state, PRESENT_M)))
         elif best == OCCLUDED and track.id in staying:  # at the previous position
             former = before[track.id].state
             track.state = State(*(former[:4] + _bounded(track.state, former, BEHIND_M)))
-        track.miss(STATUS[best], 0.0 if best in (SEEN, PRESENT) else observed_s, observed_s if best == VISIBLE else 0.0,
-                   detection_probability)
+        track.miss(STATUS[best], 0.0 if is_there or best == SEEN else observed_s,
+                   observed_s if best == VISIBLE else 0.0, detection_probability)
+
+
+def _stop(track, former, share):
+    """Return a track to its former State, with a share of the velocity."""
+    slow_u, slow_v = track.slow_mps
+    track.slow_mps = share * slow_u, share * slow_v
+    track.state = State(former.x, former.y, share * former.u, share * former.v,
+                        *_bounded(track.state, former, PRESENT_M))
 
 
 def _visibilities(tracks, occluding_m, image):
-    """The visibility {ID: PRESENT, VISIBLE, OCCLUDED or OUT_OF_VIEW} of tracks in the view of a CameraState."""
+    """The visibility {ID: PRESENT, STAYED, VISIBLE, OCCLUDED or OUT_OF_VIEW} of tracks in the view of a CameraState."""
     if not tracks:
         return {}
     visibility = classify_visibility(image.view, _positions_of(tracks), np.array([track.size_m for track in tracks]),
@@ -119,7 +133,7 @@ def classify_visibility(view, positions_m, sizes_m, others_m, max_range_m):
     VISIBLE: a detection is expected. OCCLUDED: by a person at one of the centres `others_m` (m, 3), which may contain
     the people themselves, or by something nearer in the depth image. OUT_OF_VIEW: also beyond the detector's range.
     PRESENT: with so little of the body in the image that detectors often miss it, while its place is occupied in the
-    depth image.
+    depth image. STAYED: the same, and what occupies it is farther than the axis of the body.
     """
     distances_m, bearings = view.bearings(positions_m)
     visibility = np.full(len(positions_m), VISIBLE)
@@ -129,9 +143,11 @@ def classify_visibility(view, positions_m, sizes_m, others_m, max_range_m):
     visibility[out_of_range | (shares < LEAST_IN_IMAGE)] = OUT_OF_VIEW
     undecided = np.flatnonzero((visibility != OCCLUDED) & ~out_of_range & (shares > 0))
     if view.depth_at is not None and len(undecided):
-        hidden, present = _in_depth(view, positions_m[undecided], sizes_m[undecided])
+        hidden, present, farther = _in_depth(view, positions_m[undecided], sizes_m[undecided])
         visibility[undecided[hidden & (visibility[undecided] == VISIBLE)]] = OCCLUDED
-        visibility[undecided[present & (shares[undecided] < RELIABLE_IN_IMAGE)]] = PRESENT
+        present &= shares[undecided] < RELIABLE_IN_IMAGE
+        visibility[undecided[present]] = PRESENT
+        visibility[undecided[present & farther]] = STAYED
     return visibility
 
 
@@ -199,8 +215,8 @@ def _half_widths(distances_m):
 
 
 def _in_depth(view, positions_m, sizes_m):
-    """People occluded by objects, and people who are there, (n,) bool each: most of the depth measured towards the body
-    is clearly nearer, or that of something at its distance.
+    """People occluded by objects, people who are there, and those who are farther than their axis, (n,) bool each: most
+    of the depth measured towards the body is clearly nearer, or that of something at its distance, or farther.
     """
     rotation = view.fixed_from_camera[:3, :3]  # its inverse is its transpose
     centers = (positions_m - view.fixed_from_camera[:3, 3]).dot(rotation)
@@ -212,6 +228,6 @@ def _in_depth(view, positions_m, sizes_m):
     known = np.isfinite(depths_m)
     behind_m = np.where(known, points[..., 2] - depths_m, np.nan)
     with np.errstate(invalid='ignore'):  # nan is neither
-        nearer, near = behind_m > HIDDEN_BEHIND_M, np.abs(behind_m) <= HIDDEN_BEHIND_M
+        each = behind_m > HIDDEN_BEHIND_M, np.abs(behind_m) <= HIDDEN_BEHIND_M, behind_m < 0
     counts = np.maximum(known.sum(axis=1), ACROSS.size / 3.0)
-    return nearer.sum(axis=1) > HIDDEN_SHARE * counts, near.sum(axis=1) > HIDDEN_SHARE * counts
+    return [some.sum(axis=1) > HIDDEN_SHARE * counts for some in each]

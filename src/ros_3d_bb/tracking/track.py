@@ -35,9 +35,9 @@ CUT_LASTS_NS = NS // 2  # hysteresis: an end is visible again this long after it
 LEAST_HEIGHT_M = 0.1
 STILL_MOVING = 0.5  # hysteresis: a moving track stops below this share of `moving_speed`
 NEVER_NS = -10 ** 18
-# Visibility of a detected track, and of one that is not detected, but whose place is occupied in the depth image. They
-# rank before VISIBLE, OCCLUDED and OUT_OF_VIEW.
-SEEN, PRESENT = -2, -1
+# Visibility of a detected track, and of one that is not detected, but whose place is occupied in the depth image:
+# STAYED if by something that is farther than the axis of the body. They rank before VISIBLE, OCCLUDED and OUT_OF_VIEW.
+SEEN, PRESENT, STAYED = -3, -2, -1
 LEAST_SPEED2 = 1e-12  # avoids a division by zero
 # Prediction. Chosen for recorded pedestrians by kind of motion; `./run bench prediction` shows the effect of others.
 SLOW_S = 0.3  # time constant of the slow velocity, from which the velocity differs in manoeuvres
@@ -119,12 +119,12 @@ class Track(object):
     `state` is a `kalman_filter.State`. `z_m` is the height of the centre and `z_m2` its variance; `size_m` are the
     extents, and `lower` and `upper` the ends of the body. `hits` counts the detections, of which `first_ns` and
     `last_ns` are the first and the latest. `unseen_s` is the time since the latest one, `missed_s` the part of it
-    during which a detection was expected. `visibility` is that in the latest image of each camera: SEEN, PRESENT, or as
-    `status`. `latest` is the `LatestBox`, `misses` counts the images before the confirmation in which a detection was
-    expected. `log_odds` is the track score. `kind` is the class of the group that has the most of the filtered scores
-    `votes`; `score` is the filtered score of the detections, `detection` the `Detection.index` in the latest image.
-    `innovation_m` is that of the latest image if its noise is assumed, otherwise 0. `slow_mps` is the velocity,
-    filtered over `SLOW_S`.
+    during which a detection was expected. `visibility` is that in the latest image of each camera: SEEN, PRESENT,
+    STAYED, or as `status`. `latest` is the `LatestBox`, `misses` counts the images before the confirmation in which a
+    detection was expected. `log_odds` is the track score. `kind` is the class of the group that has the most of the
+    filtered scores `votes`; `score` is the filtered score of the detections, `detection` the `Detection.index` in the
+    latest image. `innovation_m` is that of the latest image if its noise is assumed, otherwise 0. `slow_mps` is the
+    velocity, filtered over `SLOW_S`.
     """
 
     def __init__(self, track_id, measurement, stamp_ns, camera, speed_mps, even_log_odds):

@@ -72,7 +72,7 @@ class DetectorWorker(object):
 
     def _publish(self, header, image, detections):
         if len(detections.boxes) or self._publish_empty:
-            message = detections2d_to_msg(detections, self._names, header)
+            message = detections2d_to_msg(detections, self._names, header, image.shape[1::-1])
             self._boxes_pub.publish(message)
             self._diagnostics.record_latency(header.stamp)
             if self._next_stage is not None:

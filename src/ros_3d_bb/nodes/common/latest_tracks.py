@@ -10,7 +10,16 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.common.subscribers import subscribe
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
-from ros_3d_bb.planning.planner_view import usable_tracks, with_class_widths
+from ros_3d_bb.planning.planner_view import usable_tracks, with_class_widths, with_usable_covariances
+
+
+def received_tracks(message, diagnostics):
+    """The usable tracks of a TrackedObjectArray; the others, and unusable covariances, are counted and reported."""
+    tracks, faults = usable_tracks(tracks_from_msg(message))
+    diagnostics.count_dropped('tracks', faults)
+    tracks, faults = with_usable_covariances(tracks)
+    diagnostics.count_dropped('covariances', faults)
+    return tracks
 
 
 class Tracks(NamedTuple):
@@ -56,8 +65,7 @@ class LatestTracks(object):
 
     def _on_message(self, message):
         with self._diagnostics.receiving('tracks'):
-            tracks, faults = usable_tracks(tracks_from_msg(message))
-            self._diagnostics.count_dropped('tracks', faults)
+            tracks = received_tracks(message, self._diagnostics)
             received = Tracks(tracks, stamp_of(message), message.header.frame_id.lstrip('/'))
             self._newest = received
             self._on_tracks(received)
