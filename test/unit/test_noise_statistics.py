@@ -2,6 +2,7 @@
 import numpy as np
 import pytest
 
+from ros_3d_bb_lab.evaluation.noise.analysis import Inputs, analyse
 from ros_3d_bb_lab.evaluation.noise.statistics import cluster_statistics, share_between_positions
 from ros_3d_bb_lab.evaluation.noise.tables import Cluster, MeasurementTable
 
@@ -37,3 +38,11 @@ def test_variance_between_positions_is_separated_from_that_of_repetitions():
     assert share_between_positions(table, 'Z') == pytest.approx(6 / 7.0, abs=0.03)
     table.measured_m[:, 0] = np.nan
     assert share_between_positions(table, 'Z') is None
+
+
+def test_a_campaign_whose_people_at_the_sides_are_all_truncated_is_named():
+    truth_m = np.repeat([(x, z) for x in (-0.5, 0.0, 0.5) for z in (1.0, 1.5, 2.0)], 3, axis=0)
+    table = MeasurementTable('made', np.insert(truth_m, 1, 0, axis=1), truth_m, truth_m[:, 0] != 0,
+                             tuple(map(str, range(len(truth_m)))))
+    with pytest.raises(ValueError, match='2 values of X true needed; there are 9 at 0 m, without people who are trunc'):
+        analyse(Inputs.of_session(table, 'foreground', 'none'))

@@ -81,8 +81,12 @@ class Analysis(NamedTuple):
 
 def analyse(inputs):
     """Analyse `inputs`, and return an Analysis. Raises ValueError if there are too few measurements."""
-    z, x, x_variance = (axis_statistics(clusters_of(table, axis, degree + 1), degree) for table, axis, degree in (
-        (inputs.z, 'Z', Z_DEGREE), (inputs.x, 'X', X_DEGREE), (inputs.x_variance, 'X', X_DEGREE)))
+    z, x = (axis_statistics(clusters_of(table, axis, degree + 1), degree) for table, axis, degree in (
+        (inputs.z, 'Z', Z_DEGREE), (inputs.x, 'X', X_DEGREE)))
+    try:
+        x_variance = axis_statistics(clusters_of(inputs.x_variance, 'X', X_DEGREE + 1), X_DEGREE)
+    except ValueError as error:
+        raise ValueError('%s, without people who are truncated by the left or right image border' % error)
     names = set(os.path.basename(os.path.abspath(table.name)) for table in (inputs.z, inputs.x, inputs.x_variance))
     origin = {'source': ', '.join(sorted(names)), 'estimator': inputs.estimator, 'camera': inputs.camera,
               'date': datetime.date.today().isoformat()}
