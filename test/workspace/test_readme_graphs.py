@@ -32,7 +32,8 @@ LOADED = {  # beginning of a block: nodes that it starts
     'roslaunch ros_3d_bb playback.launch': PIPELINE | {'/rviz'},
     'roslaunch ros_3d_bb measure.launch': {'/viewer_node', '/people_node', '/camera_realsense'},
     'roslaunch ros_3d_bb simulation.launch rviz:=false': {'/simulator_node', '/people_node'},
-    'roslaunch ros_3d_bb viewer.launch': {'/viewer_node'},
+    'roslaunch ros_3d_bb viewer.launch session:=$HOME/simulated': {'/viewer_node'},
+    'roslaunch ros_3d_bb viewer.launch session:=$HOME/from_bag': {'/viewer_node'},
     'roslaunch ros_3d_bb gazebo.launch': PIPELINE | {'/rviz'}}
 LAUNCHES = {beginning: claimed(beginning) for beginning in LOADED}
 SIMULATION, DOCTOR = claimed('roslaunch ros_3d_bb simulation.launch scenario:='), claimed('rosrun ros_3d_bb doctor\n')

@@ -40,8 +40,11 @@ class FollowNode(object):
     The node follows the person with ~track_id, or the nearest visible one, from the moment when it is enabled. It then
     never changes to another person. The robot stops when the person has not been visible for ~lost_after, and goes on
     when the same track is visible again, or a new one that is clearly that of the person, by its place. After
-    ~recover_within, it must be enabled again. The robot keeps a speed at which it can stop before all tracked people
-    (`highest_safe_speed`). With ~output cmd_vel, it knows no obstacles other than people.
+    ~recover_within, or when the clock jumps back by more than 1 s, it must be enabled again.
+
+    With ~output cmd_vel, the speed is one at which the robot can stop before all tracked people (`highest_safe_speed`),
+    and no obstacles other than people are known. With ~output goal, the node does not limit the speed, which is that of
+    move_base: speed_limit_node can limit it.
 
     If there are no tracks or no new pose of the robot for ~timeout, one zero command is published at once, and then
     nothing, as when the node is disabled or ends. With ~output goal, the goal is cancelled instead.

@@ -38,7 +38,9 @@ class FollowParams(NamedTuple):
     distance: float = Param(
         2.0, 'Distance from the axis of the person to the origin of the robot.', 'm', limits=(0.3, 10.0),
         live=(0.5, 4))
-    max_speed: float = Param(1.0, 'Highest speed.', 'm/s', limits=(0.05, 10.0), live=(0.1, 2))
+    max_speed: float = Param(
+        1.0, 'Highest speed. This and the other limits of speed, rate and acceleration, and the safe speed, do not '
+        'apply to goals.', 'm/s', limits=(0.05, 10.0), live=(0.1, 2))
     max_rate: float = Param(1.0, 'Highest angular velocity.', 'rad/s', limits=(0.05, 10.0), live=(0.1, 3))
     acceleration: float = Param(
         0.8, 'Highest acceleration. The highest deceleration is ~deceleration.', 'm/s^2', limits=(0.05, 10.0),
