@@ -35,10 +35,11 @@ FIRST_LAYER_SHARE = 0.5
 # this share of its weight, because a rectangle may be smaller than its object.
 LEAST_OUTLINE, LEAST_INSIDE = 10, 0.3
 OUTLINE_SIGMAS = 2  # chosen: parts of the outline that are no larger than chance count nothing, as of far, noisy people
+END_PERCENT = 5  # of the samples on a body at its upper and at its lower end; chosen: the head, and the feet
 EDGE_PERCENT = 5  # of the samples ignored at the left and at the right; chosen: arms, flying pixels
 # Half width of the kernel that finds the trunk, the densest part of a body with stretched arms, and number of steps.
-# Chosen: with it, simulated arms and bending move the axis by at most 0.06 m, and the positions of cylinders do not
-# depend on which of their pixels have depth.
+# Chosen: with it, simulated arms and bending move the axis by at most 0.06 m, bending and reaching by 0.11 m, and the
+# positions of cylinders do not depend on which of their pixels have depth.
 TRUNK_HALF_WIDTH_M, TRUNK_STEPS = 0.25, 4
 # Chosen: the axis of a person is at most this far from the middle of the trunk. With less, the errors in the thesis
 # frames grow.
@@ -46,7 +47,7 @@ BESIDE_TRUNK_M = 0.03
 # Chosen: samples within this distance of the middle of the trunk are above it; a larger share of them in a row is on a
 # head than on raised arms; number of samples of background above it; share of samples of nearer objects, which may hide
 # the head or one side of the trunk.
-HEAD_HALF_WIDTH_M, LEAST_HEAD, LEAST_ABOVE, MOST_IN_FRONT = 0.1, 0.55, 4, 0.05
+HEAD_HALF_WIDTH_M, LEAST_HEAD, LEAST_ABOVE, MOST_IN_FRONT = 0.1, 0.65, 4, 0.05
 # Chosen: a camera with more tilt (sine) sees the floor beside the feet, which is as far away as the body, this high.
 LOOKS_DOWN, FEET_M = np.sin(np.radians(10)), 0.3
 
@@ -166,16 +167,21 @@ class RectSamples(object):
 
     def edges(self, on_body, lowest_m=None):
         """Left and right edge of the body whose samples are given, and the middle of its trunk, metres; those above
-        `lowest_m`, if there are any. If the mean is near the middle of the edges, it stands for the trunk."""
+        `lowest_m`, if there are any. If the median is near the middle of the edges, it stands for the trunk."""
         if lowest_m is not None:
             above = on_body & (self._along(1) < lowest_m)
             on_body = above if above.any() else on_body
         positions = self._along(0).compress(on_body)
-        left_m, right_m = edges(positions)
-        trunk_m = positions.mean()
+        left_m, right_m, trunk_m = edges(positions)
         if abs(trunk_m - (left_m + right_m) / 2) > BESIDE_TRUNK_M:
             trunk_m = middle_of_trunk(positions, trunk_m)
         return left_m, right_m, trunk_m
+
+    def ends(self, on_body):
+        """Mean distances of the upper and of the lower end of the body whose samples are given, metres."""
+        body_mm = self._ahead_mm.compress(on_body)
+        count = max(len(body_mm) * END_PERCENT // 100, 1)
+        return int(body_mm[:count].sum()) / (1000 * count), int(body_mm[-count:].sum()) / (1000 * count)
 
     def pixels_above_head(self, on_body, middle_m, layer_m):
         """Number of pixels from the upper edge of the rectangle to the head above the middle of the trunk, which raised
@@ -189,7 +195,7 @@ class RectSamples(object):
         is_above_trunk = (np.abs(across_m - middle_m) <= HEAD_HALF_WIDTH_M) & (self._ahead_mm < UNKNOWN_MM)
         counts, body = (np.count_nonzero(each.reshape(self.shape), axis=1)
                         for each in (is_above_trunk, is_above_trunk & on_body))
-        is_head = body > LEAST_HEAD * counts
+        is_head = body > LEAST_HEAD * counts.max()
         row = int(is_head.argmax())
         if not is_head[row] or (counts - body)[:row].sum() < LEAST_ABOVE:
             return 0
@@ -336,15 +342,15 @@ def middle_of_trunk(positions, middle_m):
 
 def edges(positions):
     """Lowest and highest value of a uniform distribution with these positions (n,), which are reordered: percentiles,
-    extrapolated.
+    extrapolated. Also their median.
     """
     last = len(positions) - 1
     rank, part = divmod(last * EDGE_PERCENT, 100)
     after = min(rank + 1, last)
-    positions.partition((rank, after, last - after, last - rank))
+    positions.partition((rank, after, last // 2, last - after, last - rank))
     ordered = memoryview(positions)
     low, high = ordered[rank], ordered[last - rank]
     low += (ordered[after] - low) * part / 100.0
     high -= (high - ordered[last - after]) * part / 100.0
     beyond = (high - low) * EDGE_PERCENT / (100.0 - 2 * EDGE_PERCENT)
-    return low - beyond, high + beyond
+    return low - beyond, high + beyond, ordered[last // 2]

@@ -20,7 +20,7 @@ LEAST_MEASURED = 0.02  # minimum share of the samples with depth for an estimate
 LEAST_SHARE = 0.02
 FEW = 0.2  # share of the samples from which on a layer has more than `LEAST_SHARE` of the weight, wherever it is
 LEAST_SUPPORT = 0.1  # minimum share of the samples with depth in the layer for an estimate; chosen
-TALL_M, ARMS_ABOVE_M = 1.8, 0.12  # chosen: people who appear taller may raise their arms so far above their heads
+TALL_M, ARMS_ABOVE_M = 1.8, 0.04  # chosen: people who appear taller may raise their arms so far above their heads
 LEAST_WIDTH_M = 0.05  # chosen: of a body that is one pixel wide
 FILLED = 0.4  # minimum share of both sides of a rectangle that background behind an object fills; chosen
 
@@ -33,9 +33,10 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     Background beside and between the limbs may fill most of a rectangle, but it is farther away. Around a person it
     fills the outline of the rectangle, too, as furniture and other people at the sides do. Flying pixels are too sparse
     to form a layer. The position is that of the vertical axis of the object: laterally halfway between the edges of the
-    layer, for people near the middle of the trunk, and behind its mean depth by the distance of its class. The height
-    of people does not include raised arms. If the image border truncates the object, it is completed to the usual size
-    of its class. All of this is done in the level frame.
+    layer, for people near the middle of the trunk, and behind its mean depth by the distance of its class. Its ends
+    are at their own distances: the head of a person who bends is nearer than the feet. The height of people does not
+    include raised arms. If the image border truncates the object, it is completed to the usual size of its class. All
+    of this is done in the level frame.
 
     In the rectangles of nearer objects with plausible boxes, pixels that are not behind them are masked. Rectangles are
     therefore estimated in groups, each after those in front of it. Of several rectangles of one object, only the
@@ -125,7 +126,8 @@ def _visible_extents(samples, flat_px, geometry, may_repeat):
     # The mean without the nearest and the farthest tenth is finer than the median, which has the depth resolution.
     layer_m = layer.mean_mm(layer.first + count // 10, layer.end - count // 10) / 1000
     upper, lower = slopes_down(flat_px, geometry)
-    top_m, bottom_m = layer_m * upper, layer_m * lower
+    upper_m, lower_m = samples.ends(on_body)
+    top_m, bottom_m = upper_m * upper, lower_m * lower
     looks_down = geometry.level_axes[1][2] > LOOKS_DOWN
     left_m, right_m, trunk_m = samples.edges(on_body, bottom_m - FEET_M if looks_down else None)
     if bottom_m - top_m > TALL_M:
@@ -156,7 +158,7 @@ def _box(seen, rect_px, truncated, kind, geometry):
     width_m = max(right_m - left_m, LEAST_WIDTH_M)
     axis_m = layer_m + kind.axis_behind(width_m)
     along_ray = axis_m / layer_m
-    across_m, down_m = middle_m * along_ray, (top_m + bottom_m) / 2 * along_ray
+    across_m, down_m = middle_m * along_ray, (top_m + bottom_m) / 2
     center_m = [x * across_m + y * down_m + z * axis_m for x, y, z in zip(*geometry.level_axes)]
     size_m = np.array((width_m, bottom_m - top_m, width_m))
     return Box3D(np.array(center_m), size_m, rect_px, support, truncated, largest_m=kind.largest_m), axis_m
