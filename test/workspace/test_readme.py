@@ -9,8 +9,9 @@ import xml.etree.ElementTree as ElementTree
 import pytest
 import yaml
 
+from ros_3d_bb.core.params import SET_BY_LAUNCH, table_of
 from support.code_blocks import PAGES, ROOT
-from support.pages import figures
+from support.pages import figures, node_pages
 
 NAMED = PAGES + ('doc/error_model.md',)  # its blocks are the record of a campaign
 FORMAT = re.compile(r'%[-+\d.]*[a-zA-Z]')
@@ -51,6 +52,16 @@ def test_messages_in_the_table_of_symptoms_are_in_the_code():
     quoted = [message for row in rows for message in re.findall(r'`([^`]+)`', row[0]) if ' ' in message]
     assert len(quoted) > 10
     assert [message for message in quoted if not any(message in text for text in texts)] == []
+
+
+def test_the_table_of_live_parameters_agrees_with_the_code():
+    types = {node.name: node_pages.parameter_types(node.node_class) for node in node_pages.nodes()}
+    rows = rows_below('doc/tuning.md', '| node | live parameters of its file in [config](../config) |')
+    for name, listed in [(name, row[1]) for row in rows for name in re.findall(r'\w+', row[0])]:
+        expected = set(parameter for parameter, param in table_of(types.pop(name)).items()
+                       if param.section != SET_BY_LAUNCH and bool(param.live) != listed.startswith('all but'))
+        assert set(re.findall(r'`(\w+)`', listed)) == expected, name
+    assert not any(param.live for kinds in types.values() for param in table_of(kinds).values())
 
 
 @pytest.mark.parametrize('name', sorted(FIGURES))

@@ -23,7 +23,7 @@ from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams, TrackingStage
 from ros_3d_bb.visualization.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter
 
-RESERVED_IDS = 1000  # IDs per reservation: a restarted tracker continues with the next thousand
+RESERVED_IDS = 1000  # IDs per reservation: a restarted tracker skips up to as many
 LARGEST_PARAM = 2 ** 31 - 1  # largest integer of a ROS parameter
 
 
