@@ -116,7 +116,7 @@ def test_the_former_track_is_followed_again_if_it_fits_clearly_better(x, followe
         selected(selector, time_s, person(1, 3, 0))
     assert selected(selector, 1.8, person(3, 2, 0, first_s=1.6)) == 3
     assert selected(selector, 2.0, person(1, x, 0.1), person(3, 2, 0, first_s=1.6)) == followed
-    assert selected(selector, 2.2, person(1, x, 0.1), person(3, 2, 0, first_s=1.6)) == followed
+    assert selected(selector, 2.2, person(1, x, 0.1)) == followed
 
 
 @pytest.mark.parametrize('turn_mps, followed', [(1.0, 3), (0.1, 1)])

@@ -125,10 +125,10 @@ class TargetSelector(object):
         """Change to another track where the tracker has confused the person with one who crosses: the old track has
         left the path that was predicted before the other one began, or was visible again, and that is on it. Change
         back to the former track if this is on the path."""
-        self._path = [seen for seen in self._path if 0 <= stamp_ns - seen.stamp_ns <= PATH_NS]
-        begins_ns = dict([(track.id, track.first_seen_ns) for track in tracks]
-                         + [(key, since_ns) for key, (_seen, since_ns) in self._back.items()])
         own = self._seen[self.target.id]
+        if own.stamp_ns < stamp_ns and not self._has_changed(stamp_ns):
+            return
+        self._path = [seen for seen in self._path if 0 <= stamp_ns - seen.stamp_ns <= PATH_NS]
         tracks = [track._replace(first_seen_ns=self._back[track.id][1]) if track.id in self._back else track
                   for track in tracks]
         new_ns = [track.first_seen_ns for track in tracks
@@ -138,9 +138,12 @@ class TargetSelector(object):
             old = predicted_to([own.track], (stamp_ns - own.stamp_ns) / NS)[0]._replace(first_seen_ns=stamp_ns)
             self._change_to_nearest([track for track in tracks if track.id != own.track.id], before, stamp_ns,
                                     [_normalized_distance(old, before, stamp_ns)])
-        own = self._seen[self.target.id]
-        if own.stamp_ns == stamp_ns and (self._changed_ns is None or stamp_ns - self._changed_ns > PATH_NS):
+        if not self._has_changed(stamp_ns):
             self._path.append(own)
+
+    def _has_changed(self, stamp_ns):
+        """Whether the ID of the target has changed within the last PATH_NS."""
+        return self._changed_ns is not None and stamp_ns - self._changed_ns <= PATH_NS
 
     def _change_to_nearest(self, tracks, before, stamp_ns, others):
         """Make the track that is nearest to where `before`, a _Seen, is expected the target, if its distance is clearly

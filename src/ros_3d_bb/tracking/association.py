@@ -19,9 +19,9 @@ def associate(tracks, measurements, stamp_ns, params, outliers):
     """Assign measurements to tracks in a cascade: recently matched, then missed, then tentative tracks.
 
     A pair is allowed only if the track explains the measurement better than a new target does (the gate), and both
-    have the same group of classes. Of the pairs, those are selected that explain all measurements best: one may well be
-    a new target although a track could have taken it, at the cost of another one. `params` are `tracker.TrackerParams`, `outliers` their OutlierModel. Returns a list
-    of (Track, Measurement).
+    have the same group of classes. Of the allowed pairs, those are selected that explain all measurements best, with a
+    new target where no pair is left. `params` are `tracker.TrackerParams`, `outliers` their OutlierModel. Returns a
+    list of (Track, Measurement).
     """
     matches, ranks, taken = [], {}, set()
     for pair, cost in allowed_costs(tracks, measurements, params, outliers).items():
@@ -37,8 +37,9 @@ def associate(tracks, measurements, stamp_ns, params, outliers):
 
 
 def allowed_costs(tracks, measurements, params, outliers):
-    """The costs {(number of the track, number of the measurement): cost} of the allowed pairs, less that of a new target:
-    -log of the density of the measurement given the track, per m², and the cost of their heights. All are negative."""
+    """The costs {(number of the track, number of the measurement): cost} of the allowed pairs, less that of a new
+    target: -log of the density of the measurement given the track, per m², and the cost of their heights.
+    """
     gates = [_gate(measurement, params.new_target_density, outliers) for measurement in measurements]
     is_crowd = len(tracks) * len(measurements) >= CROWD
     pairs = (_likely_pairs_of_crowd if is_crowd else _likely_pairs)(tracks, measurements, gates, outliers)
@@ -134,8 +135,8 @@ def height_cost(track, measurement, sigma_m):
 
 
 def _assigned(costs):
-    """The pairs with the minimum total cost, from {(row, column): cost} of the allowed ones, all of them negative. It is
-    not necessarily the largest number of pairs."""
+    """The pairs with the minimum total cost, from {(row, column): cost} of the allowed ones: not always as many pairs
+    as possible."""
     if not costs:
         return []
     rows, columns = (sorted(set(numbers)) for numbers in zip(*costs))
