@@ -19,13 +19,16 @@ KINDS, VIEW = Kinds(ObjectClasses()), CameraView(mounted(1.0))
 SEEDS = st.integers(0, 2 ** 32 - 1)
 
 
+def measured_at(detections, images=1.0):
+    return measurements_of(detections, VIEW, BoxNoise(0.1, 1.0, 0.035, images), KINDS)
+
+
 def measured(random, count):
     """Measurements of people and chairs in an area of 4 m x 4 m, with standard deviations of 0.03 to 0.6 m."""
-    return measurements_of([Detection((3 + random.uniform(-2, 2), random.uniform(-2, 2), 0.85),
-                                      (0.5, 0.5, random.uniform(1.5, 1.9)),
-                                      np.eye(3) * 10 ** random.uniform(-3, -0.4),
-                                      label=random.choice(['person', 'person', 'chair'])) for _ in range(count)],
-                           VIEW, BoxNoise(0.1, 1.0, 0.035, random.uniform(1, 5)), KINDS)
+    return measured_at([Detection((3 + random.uniform(-2, 2), random.uniform(-2, 2), 0.85),
+                                  (0.5, 0.5, random.uniform(1.5, 1.9)), np.eye(3) * 10 ** random.uniform(-3, -0.4),
+                                  label=random.choice(['person', 'person', 'chair'])) for _ in range(count)],
+                       random.uniform(1, 5))
 
 
 def scene(seed):
@@ -63,3 +66,17 @@ def test_tracks_and_measurements_are_matched_once_within_a_group(seed):
     for members in zip(*matches):
         assert len(set(map(id, members))) == len(matches)
     assert all(track.kind.group == measurement.kind.group for track, measurement in matches)
+
+
+def test_a_newcomer_does_not_push_a_person_to_the_track_of_another_one():
+    """The person of the second track, hidden before, reappears out of its gate and within that of the first one."""
+    def at(*places):
+        return measured_at([Detection((3, y, 0.85), (0.5, 0.5, 1.7), np.eye(3) * 0.05 ** 2) for y in places])
+
+    params = TrackerParams()
+    outliers = outlier_model(params)
+    tracks = [Track(number, measurement, 0, '', 0.8, 0.0).predicted(unseen_s, 0.08)
+              for number, measurement, unseen_s in zip((1, 2), at(0.0, 0.4), (0.1, 0.3))]
+    boxes = at(0.05, -0.3)
+    assert set(allowed_costs(tracks, boxes, params, outliers)) == {(0, 0), (0, 1), (1, 0)}
+    assert associate(tracks, boxes, 0, params, outliers) == [(tracks[0], boxes[0])]

@@ -100,6 +100,25 @@ def test_a_person_is_recognised_at_once_while_the_old_track_is_occluded():
                     person(3, 3.1, 0, first_s=1.2)) == 3
 
 
+@pytest.mark.parametrize('published, followed', [(True, 1), (False, 3)])
+def test_someone_near_is_not_taken_for_a_person_who_is_still_tracked(published, followed):
+    """Someone steps between the robot and the person, and hides the person."""
+    selector = TargetSelector()
+    selected(selector, 1, person(1, 3, 0))
+    hidden = [person(1, 3, 0, OCCLUDED)] if published else []
+    assert selected(selector, 1.8, person(3, 2, 0, first_s=1.6), *hidden) == followed
+
+
+@pytest.mark.parametrize('x, followed', [(3, 1), (1.8, 3)])
+def test_the_former_track_is_followed_again_if_it_fits_clearly_better(x, followed):
+    selector = TargetSelector()
+    for time_s in np.arange(0, 1.01, 0.1):
+        selected(selector, time_s, person(1, 3, 0))
+    assert selected(selector, 1.8, person(3, 2, 0, first_s=1.6)) == 3
+    assert selected(selector, 2.0, person(1, x, 0.1), person(3, 2, 0, first_s=1.6)) == followed
+    assert selected(selector, 2.2, person(1, x, 0.1)) == followed
+
+
 @pytest.mark.parametrize('turn_mps, followed', [(1.0, 3), (0.1, 1)])
 def test_an_id_switch_to_a_person_who_crosses_is_noticed(turn_mps, followed):
     """Track 1 of a person who walks along x goes on across it, and a new one begins where the person is."""
@@ -109,6 +128,19 @@ def test_an_id_switch_to_a_person_who_crosses_is_noticed(turn_mps, followed):
     for time_s in np.arange(2.1, 3.01, 0.1):
         own = person(1, 2 + 0.7 * time_s, -turn_mps * (time_s - 2), vx=0.7, vy=-turn_mps)
         found = selected(selector, time_s, own, person(3, 2 + 0.7 * time_s, 0, vx=0.7, first_s=2.25))
+    assert found == followed
+
+
+@pytest.mark.parametrize('x, followed', [(4.6, 2), (3.7, 1)])
+def test_two_people_who_have_changed_tracks_are_noticed(x, followed):
+    """A person stands hidden by the one who walks along x. Their tracks part, and one of them is at x: in the way, or
+    where the hidden person was."""
+    selector = TargetSelector()
+    for time_s in np.arange(0, 3.01, 0.1):
+        hidden = OCCLUDED if 2 < time_s < 2.55 else VISIBLE
+        selected(selector, time_s, person(1, 2 + 0.7 * time_s, 0, vx=0.7), person(2, 3.6, 0, hidden))
+    for time_s in np.arange(3.1, 3.71, 0.1):
+        found = selected(selector, time_s, person(1, 4.1, 3 - time_s, vy=-1.0), person(2, x, 0))
     assert found == followed
 
 

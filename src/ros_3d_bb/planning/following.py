@@ -13,7 +13,7 @@ from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.core.time_sync import JUMP_NS, NS
 from ros_3d_bb.planning.planner_view import position_after, predicted_to
 from ros_3d_bb.planning.safe_speed import highest_safe_speed
-from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE
+from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
 
 # A lost person is within NEAR_M of the prediction, and TURNING_MPS more for each second, up to FARTHEST_M; chosen.
 NEAR_M, TURNING_MPS, FARTHEST_M = 0.5, 1.0, 2.0
@@ -56,13 +56,21 @@ class FollowParams(NamedTuple):
         limits=(0.0, 600.0), live=(0, 60))
 
 
+class _Seen(NamedTuple):
+    """A TrackedObject when it was last visible, the stamp of that, and the stamp when it was last published at all."""
+
+    track: TrackedObject
+    stamp_ns: int
+    published_ns: int
+
+
 class TargetSelector(object):
     """Which track is the person to follow.
 
     The first one is chosen by ID, or is the nearest visible person. From then on no other person is chosen. If the
     tracker has lost the person, it gives a new ID to the person who reappears. That track is recognised by its place:
     it must be clearly nearer to where the person is expected than other new tracks, and than it is to where another
-    lost person is expected.
+    lost person is expected. If the former track is visible again and fits clearly better, it is the person after all.
 
     Attributes: `target`, the TrackedObject when the person was last visible, None before the choice, and
     `has_given_up`, whether the person was lost for too long.
@@ -70,8 +78,11 @@ class TargetSelector(object):
 
     def __init__(self):
         self.target, self.has_given_up = None, False
-        self._seen = {}  # (track, stamp) when it was last visible, by track ID
-        self._path = []  # (track, stamp) of the target in the last PATH_NS
+        self._seen = {}  # _Seen by track ID
+        self._path = []  # _Seen of the target in the last PATH_NS, up to a change of its ID
+        self._changed_ns = None  # stamp of that change
+        self._back = {}  # (_Seen before, stamp since) of tracks that have been visible again for at most PATH_NS, by ID
+        self._latest_ns = None  # stamp of the latest tracks
 
     def select(self, tracks, stamp_ns, robot_m, params):
         """The track of the person at a stamp, predicted if it is not among the tracks; None if the person is lost.
@@ -82,58 +93,77 @@ class TargetSelector(object):
             self.target = _chosen(tracks, robot_m, params.track_id)
         if self.target is None or self.has_given_up:
             return None
-        if self.target.id in self._seen and stamp_ns < self._seen[self.target.id][1] - JUMP_NS:
+        if self.target.id in self._seen and stamp_ns < self._seen[self.target.id].stamp_ns - JUMP_NS:
             self.has_given_up = True  # the clock went back
             return None
-        self._seen = {key: entry for key, entry in self._seen.items()
-                      if key == self.target.id or stamp_ns - entry[1] <= params.recover_within * NS}
-        self._seen.update((track.id, (track, stamp_ns)) for track in tracks if track.status == VISIBLE)
-        lost_s = (stamp_ns - self._seen[self.target.id][1]) / NS
-        if lost_s > 0:
-            self._recover(tracks, stamp_ns)
-        else:
-            self._check_identity(tracks, stamp_ns)
-        lost_s = (stamp_ns - self._seen[self.target.id][1]) / NS
-        self.target = self._seen[self.target.id][0]
+        self._update(tracks, stamp_ns, params.recover_within)
+        self._check_identity(tracks, stamp_ns)
+        if self._seen[self.target.id].stamp_ns < stamp_ns:
+            self._change_to_nearest(tracks, self._seen[self.target.id], stamp_ns, [])
+        self.target, seen_ns, _published_ns = self._seen[self.target.id]
+        lost_s = (stamp_ns - seen_ns) / NS
         self.has_given_up = lost_s > params.recover_within
         if lost_s > params.lost_after:
             return None
         predicted, = predicted_to([self.target], lost_s)
         return next((track for track in tracks if track.id == self.target.id), predicted._replace(status=OCCLUDED))
 
-    def _check_identity(self, tracks, stamp_ns):
-        """Change to the new track of the person where the tracker has given the old one to a person who crosses: the
-        old one has left the path that was predicted before the new one began, and the new one is on it."""
-        self._path = [entry for entry in self._path if 0 <= stamp_ns - entry[1] <= PATH_NS]
-        own = self._seen[self.target.id]
-        new = [track for track in tracks if self._path and track.first_seen_ns > self._path[0][1] + SWITCHING_NS]
-        if new:
-            first_ns = min(track.first_seen_ns for track in new)
-            before = [entry for entry in self._path if entry[1] < first_ns - SWITCHING_NS][-1]
-            old = own[0]._replace(first_seen_ns=stamp_ns)
-            self._change_to_nearest(new, before, stamp_ns, [_normalized_distance(old, before, stamp_ns)])
-        self._path.append(self._seen[self.target.id])
+    def _update(self, tracks, stamp_ns, longest_s):
+        """Note which tracks are visible, and which are published. Others are forgotten after `longest_s` seconds."""
+        self._seen = {key: seen for key, seen in self._seen.items()
+                      if key == self.target.id or stamp_ns - seen.stamp_ns <= longest_s * NS}
+        self._back = {key: back for key, back in self._back.items() if stamp_ns - back[1] <= PATH_NS}
+        for track in tracks:
+            seen = self._seen.get(track.id)
+            if track.status == VISIBLE:
+                if seen and seen.stamp_ns < self._latest_ns:
+                    self._back[track.id] = seen, stamp_ns
+                self._seen[track.id] = _Seen(track, stamp_ns, stamp_ns)
+            elif seen:
+                self._seen[track.id] = seen._replace(published_ns=stamp_ns)
+        self._latest_ns = stamp_ns
 
-    def _recover(self, tracks, stamp_ns):
-        """Make the new track of the lost person the target, if it is clear which one that is."""
-        self._change_to_nearest(tracks, self._seen[self.target.id], stamp_ns, [])
+    def _check_identity(self, tracks, stamp_ns):
+        """Change to another track where the tracker has confused the person with one who crosses: the old track has
+        left the path that was predicted before the other one began, or was visible again, and that is on it. Change
+        back to the former track if this is on the path."""
+        own = self._seen[self.target.id]
+        if own.stamp_ns < stamp_ns and not self._has_changed(stamp_ns):
+            return
+        self._path = [seen for seen in self._path if 0 <= stamp_ns - seen.stamp_ns <= PATH_NS]
+        tracks = [track._replace(first_seen_ns=self._back[track.id][1]) if track.id in self._back else track
+                  for track in tracks]
+        new_ns = [track.first_seen_ns for track in tracks
+                  if self._path and track.first_seen_ns > self._path[0].stamp_ns + SWITCHING_NS]
+        if new_ns:
+            before = [seen for seen in self._path if seen.stamp_ns < min(new_ns) - SWITCHING_NS][-1]
+            old = predicted_to([own.track], (stamp_ns - own.stamp_ns) / NS)[0]._replace(first_seen_ns=stamp_ns)
+            self._change_to_nearest([track for track in tracks if track.id != own.track.id], before, stamp_ns,
+                                    [_normalized_distance(old, before, stamp_ns)])
+        if not self._has_changed(stamp_ns):
+            self._path.append(own)
+
+    def _has_changed(self, stamp_ns):
+        """Whether the ID of the target has changed within the last PATH_NS."""
+        return self._changed_ns is not None and stamp_ns - self._changed_ns <= PATH_NS
 
     def _change_to_nearest(self, tracks, before, stamp_ns, others):
-        """Make the track that is nearest to where `before`, (track, stamp), is expected the target, if its distance
-        is clearly less than those of the other tracks, than `others`, and than its own as that of another lost
-        person."""
+        """Make the track that is nearest to where `before`, a _Seen, is expected the target, if its distance is clearly
+        less than those of the other tracks, than `others`, and than its own as that of another lost person."""
         visible = set(track.id for track in tracks if track.status == VISIBLE)
         near = sorted(((_normalized_distance(track, before, stamp_ns), track.id) for track in tracks
                        if track.id in visible and track.label == self.target.label), key=lambda each: each[0])
         if not near or near[0][0] > 1:
             return
         distance, track_id = near[0]
-        lost = [entry for key, entry in self._seen.items() if key != self.target.id and entry[1] < stamp_ns]
+        lost = [seen for key, seen in self._seen.items() if key != self.target.id and seen.stamp_ns < stamp_ns]
+        if track_id in self._back and track_id != before.track.id:
+            lost.append(self._back[track_id][0])
         others = others + [other for other, _id in near[1:]] + [
-            _normalized_distance(self._seen[track_id][0], entry, stamp_ns) for entry in lost]
+            _normalized_distance(self._seen[track_id].track, seen, stamp_ns) for seen in lost]
         if max(distance / CLEARLY, distance + LEAST_DIFFERENCE) < min(others, default=np.inf):
             del self._seen[self.target.id]
-            self.target = self._seen[track_id][0]
+            self.target, self._changed_ns = self._seen[track_id].track, stamp_ns
 
 
 def _chosen(tracks, robot_m, track_id):
@@ -144,13 +174,15 @@ def _chosen(tracks, robot_m, track_id):
 
 
 def _normalized_distance(track, seen, stamp_ns):
-    """Distance of a track from where a lost one, (track, stamp) when last seen, is expected, relative to the distance
-    within which it must be; infinite if both existed at the same time."""
-    lost, seen_ns = seen
-    lost_s = (stamp_ns - seen_ns) / NS
-    expected_m = position_after(lost, min(lost_s, LONGEST_PREDICTION_S))
-    distance_m = np.linalg.norm((track.position_m - expected_m)[:2])
-    return distance_m / min(NEAR_M + TURNING_MPS * lost_s, FARTHEST_M) if track.first_seen_ns > seen_ns else np.inf
+    """Distance of a track from where a lost one, a _Seen, is expected, relative to the distance within which it must
+    be; infinite if both are of different people, as they existed at the same time. As long as the lost one is
+    published, it is still tracked, and must be near."""
+    lost, seen_ns, published_ns = seen
+    if track.first_seen_ns <= seen_ns and track.id != lost.id:
+        return np.inf
+    expected_m = position_after(lost, min((stamp_ns - seen_ns) / NS, LONGEST_PREDICTION_S))
+    farthest_m = min(NEAR_M + TURNING_MPS * (stamp_ns - published_ns) / NS, FARTHEST_M)
+    return np.linalg.norm((track.position_m - expected_m)[:2]) / farthest_m
 
 
 class Follower(object):

@@ -19,8 +19,9 @@ def associate(tracks, measurements, stamp_ns, params, outliers):
     """Assign measurements to tracks in a cascade: recently matched, then missed, then tentative tracks.
 
     A pair is allowed only if the track explains the measurement better than a new target does (the gate), and both
-    have the same group of classes. `params` are `tracker.TrackerParams`, `outliers` their OutlierModel. Returns a list
-    of (Track, Measurement).
+    have the same group of classes. Of the allowed pairs, those are selected that explain all measurements best, with a
+    new target where no pair is left. `params` are `tracker.TrackerParams`, `outliers` their OutlierModel. Returns a
+    list of (Track, Measurement).
     """
     matches, ranks, taken = [], {}, set()
     for pair, cost in allowed_costs(tracks, measurements, params, outliers).items():
@@ -36,8 +37,9 @@ def associate(tracks, measurements, stamp_ns, params, outliers):
 
 
 def allowed_costs(tracks, measurements, params, outliers):
-    """The costs {(number of the track, number of the measurement): cost} of the allowed pairs: -log of the density of
-    the measurement given the track, per m², and the cost of their heights."""
+    """The costs {(number of the track, number of the measurement): cost} of the allowed pairs, less that of a new
+    target: -log of the density of the measurement given the track, per m², and the cost of their heights.
+    """
     gates = [_gate(measurement, params.new_target_density, outliers) for measurement in measurements]
     is_crowd = len(tracks) * len(measurements) >= CROWD
     pairs = (_likely_pairs_of_crowd if is_crowd else _likely_pairs)(tracks, measurements, gates, outliers)
@@ -46,7 +48,7 @@ def allowed_costs(tracks, measurements, params, outliers):
         track, measurement = tracks[row], measurements[column]
         cost += height_cost(track, measurement, params.height_sigma)
         if cost < gates[column][0] and track.kind.group == measurement.kind.group:
-            costs[row, column] = cost
+            costs[row, column] = cost - gates[column][0]
     return costs
 
 
@@ -133,17 +135,19 @@ def height_cost(track, measurement, sigma_m):
 
 
 def _assigned(costs):
-    """The maximum number of pairs with the minimum total cost, from {(row, column): cost} of the allowed ones."""
+    """The pairs with the minimum total cost, from {(row, column): cost} of the allowed ones: not always as many pairs
+    as possible."""
     if not costs:
         return []
     rows, columns = (sorted(set(numbers)) for numbers in zip(*costs))
     if len(rows) == len(columns) == len(costs):  # no choice
         return sorted(costs)
-    matrix = np.full((len(rows), len(columns)), np.inf)
+    matrix = np.zeros((len(rows), len(columns)))
     row_of, column_of = ({number: place for place, number in enumerate(numbers)} for numbers in (rows, columns))
     for (row, column), cost in costs.items():
         matrix[row_of[row], column_of[column]] = cost
-    return [(rows[row], columns[column]) for row, column in zip(*(found.tolist() for found in assign(matrix)))]
+    found = zip(*(places.tolist() for places in linear_sum_assignment(matrix)))
+    return [pair for pair in ((rows[row], columns[column]) for row, column in found) if pair in costs]
 
 
 def match_greedily(distances):
