@@ -88,3 +88,11 @@ def test_the_pipeline_starts_nodes_for_each_camera_and_one_tracker(cameras):
     assert started - {'/tracker_node'} == set('/%s/%s' % (name, node) for name in names
                                               for node in ('depth_detector_node', 'bbox3d_node'))
     assert parameters['/tracker_node/cameras'] == cameras
+
+
+@pytest.mark.parametrize('argument, shown', [
+    ('camera_image:=rgb/image_rect', 'rgb/image_rect'), ('camera_image:=rgb/image/compressed', 'rgb/image'),
+    ('cameras:=front,rear', 'front/color/image_raw')])
+def test_rviz_shows_the_colour_images_of_the_camera(argument, shown):
+    _parameters, nodes = loaded('pipeline.launch', 'rviz:=true', 'detector:=depth', argument)
+    assert dict(nodes['rviz'].remap_args)['camera/color/image_raw'] == shown
