@@ -42,7 +42,7 @@ BESIDE_DETECTOR = claimed('roslaunch ros_3d_bb pipeline.launch detector:=none')
 PLANNER = claimed('roslaunch ros_3d_bb pipeline.launch weights:=$HOME/yolov5n.pt planner:=')
 PLANNER_POINTS = claimed('rostopic echo -n 1 /planner_bridge_node')
 TRACK_PRINTER = claimed('import rospy', 'python')
-DIAGNOSTICS = claimed('rostopic echo -n 1 /diagnostics')
+DIAGNOSTICS = claimed('rostopic echo -n 5 /diagnostics')
 LIVE = [claimed('rosrun dynamic_reconfigure dynparam set /tracker_node ' + beginning) for beginning in ('pred', '"{')]
 MOUNT = claimed('rosrun tf2_ros static_transform_publisher')
 ON_NOETIC = claimed('sudo apt install ros-noetic-ros-base')
