@@ -33,10 +33,10 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     Background beside and between the limbs may fill most of a rectangle, but it is farther away. Around a person it
     fills the outline of the rectangle, too, as furniture and other people at the sides do. Flying pixels are too sparse
     to form a layer. The position is that of the vertical axis of the object: laterally halfway between the edges of the
-    layer, for people near the middle of the trunk, and behind its mean depth by the distance of its class. Its ends
-    are at their own distances: the head of a person who bends is nearer than the feet. The height of people does not
-    include raised arms. If the image border truncates the object, it is completed to the usual size of its class. All
-    of this is done in the level frame.
+    layer, for people near the middle of the trunk, and behind its mean depth by the distance of its class. Before a
+    tilted camera, its ends are at their own distances: the head of a person who bends is nearer than the feet. The
+    height of people does not include raised arms. If the image border truncates the object, it is completed to the
+    usual size of its class. All of this is done in the level frame.
 
     In the rectangles of nearer objects with plausible boxes, pixels that are not behind them are masked. Rectangles are
     therefore estimated in groups, each after those in front of it. Of several rectangles of one object, only the
@@ -126,9 +126,10 @@ def _visible_extents(samples, flat_px, geometry, may_repeat):
     # The mean without the nearest and the farthest tenth is finer than the median, which has the depth resolution.
     layer_m = layer.mean_mm(layer.first + count // 10, layer.end - count // 10) / 1000
     upper, lower = slopes_down(flat_px, geometry)
-    upper_m, lower_m = samples.ends(on_body)
-    top_m, bottom_m = upper_m * upper, lower_m * lower
     looks_down = geometry.level_axes[1][2] > LOOKS_DOWN
+    # Before a level camera, the distances of the ends hardly matter, and the mean is less noisy.
+    upper_m, lower_m = samples.ends(on_body) if looks_down else (layer_m, layer_m)
+    top_m, bottom_m = upper_m * upper, lower_m * lower
     left_m, right_m, trunk_m = samples.edges(on_body, bottom_m - FEET_M if looks_down else None)
     if bottom_m - top_m > TALL_M:
         left_px, top_px, right_px, bottom_px = flat_px
