@@ -198,8 +198,9 @@ def process_bag(source, target, settings=Settings()):
     events = EventCounter()
     with BagReader(source) as reader, new_bag(target, settings.compression) as bag:
         run, copy = BagRun(reader, settings, events), _copier(bag, settings)
+        known = set(reader.topics) | _outputs_of(settings)
         for topic in settings.keep or ():
-            if not {topic, '/' + topic} & (set(reader.topics) | _outputs_of(settings)):
+            if '/' + topic not in known:
                 events.note(NOT_KEPT, 'the bag has no topic /%s; did you mean %s?'
                             % (topic, nearest_name(topic, reader.topics)))
         for raw, outputs in run.outputs():

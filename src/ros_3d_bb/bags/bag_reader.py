@@ -9,6 +9,7 @@ import genpy
 import rosbag
 import rosbag.bag
 
+from ros_3d_bb.conversions.camera_msgs import absolute
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.core.params import nearest_name
 
@@ -45,7 +46,7 @@ class BagReader(object):
             if self._bag.version != 200:
                 raise ValueError('its format has the version %s; 200 (2.0) expected' % self._bag.version)
             connections = list(self._bag._get_connections())
-            self.topics = {_absolute(connection.topic): connection.datatype for connection in connections}
+            self.topics = {absolute(connection.topic): connection.datatype for connection in connections}
             self._stored_names = set(connection.topic for connection in connections)
             self._unread = set(connection.md5sum for connection in connections) - set(rosbag.bag._message_types)
             rosbag.bag._message_types.update((md5sum, UNREAD) for md5sum in self._unread)
@@ -82,7 +83,7 @@ class BagReader(object):
 
     def messages(self, topics=None):
         """Yield the messages (Raw) of all or some topics in the order of recording. Raises BagError."""
-        names = None if topics is None else [name for name in self._stored_names if _absolute(name) in topics]
+        names = None if topics is None else [name for name in self._stored_names if absolute(name) in topics]
         if names == []:  # rosbag would read all topics
             return
         entries = self._bag.read_messages(names, raw=True, return_connection_header=True)
@@ -96,11 +97,7 @@ class BagReader(object):
                 raise
             except Exception as error:  # as above
                 raise BagError('%s is damaged (%s)' % (self._path, cause(error)))
-            yield Raw(_absolute(entry.topic), datatype, md5sum, data, entry.timestamp, entry.connection_header)
-
-
-def _absolute(name):
-    return '/' + name.lstrip('/')
+            yield Raw(absolute(entry.topic), datatype, md5sum, data, entry.timestamp, entry.connection_header)
 
 
 def message_in(raw, *kinds):

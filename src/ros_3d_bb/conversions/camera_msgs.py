@@ -46,6 +46,11 @@ class CameraFrame(NamedTuple):
     transforms: Sequence[Any]
 
 
+def absolute(name):
+    """Name of a topic with a leading slash."""
+    return '/' + name.lstrip('/')
+
+
 def topic_of(camera, topic):
     """Return the name of a topic for a camera, given by its namespace; '' for a single camera.
 

@@ -8,8 +8,8 @@ from std_msgs.msg import Int32MultiArray
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.conversions.camera_msgs import (COLOR_INFO_IMAGES, COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, IMAGE_KINDS,
-                                               INFO_TOPICS, STATIC_TOPIC, TF_TOPIC, info_of_images, topic_of,
-                                               uncompressed)
+                                               INFO_TOPICS, STATIC_TOPIC, TF_TOPIC, absolute, info_of_images,
+                                               topic_of, uncompressed)
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, Boxes2D, boxes2d_from_msg,
                                                    boxes3d_to_msg, detections2d_to_msg, header_of, tracks_to_msg)
 from ros_3d_bb.core.error_text import cause
@@ -69,7 +69,7 @@ class Settings(NamedTuple):
         if topic in (DEPTH_TOPIC, DEPTH_INFO_TOPIC):
             topic = DEPTH_TOPICS[self.bbox3d[0].depth][topic == DEPTH_INFO_TOPIC]
         topic = topic_of(camera, topic)
-        return '/' + self.names.get(topic, topic).lstrip('/')
+        return absolute(self.names.get(topic, topic))
 
     @property
     def publish_empty(self):

@@ -12,7 +12,7 @@ import matplotlib
 import numpy as np
 import rosbag
 
-from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, topic_of
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, absolute, topic_of
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg, stamp_of,
                                                    tracks_from_msg, transform_from_msg)
@@ -127,11 +127,6 @@ def messages_on(bag, topics):
     names = [name for name in bag.get_type_and_topic_info().topics if absolute(name) in topics]
     for name, message, _time in bag.read_messages(names) if names else ():  # rosbag reads all topics for []
         yield absolute(name), message
-
-
-def absolute(name):
-    """Topic with a leading slash."""
-    return '/' + name.lstrip('/')
 
 
 def paths_of(recording):
