@@ -5,7 +5,7 @@ from ros_3d_bb_annotator.lengths import parse_length
 from ros_3d_bb_annotator.measurement import Mark
 
 HEADER = re.compile(r'(name|mark|label)\b', re.IGNORECASE)
-LEAST_Z_M = 0.05  # nobody stands nearer; probably metres without a unit
+LEAST_Z_M = 0.05  # people stand farther away; probably metres without a unit
 
 
 def mark_of(name, x, z, where):

@@ -32,13 +32,13 @@ def test_a_pillar_has_a_corner_on_each_side_of_its_shadow(x):
     assert beside == pytest.approx([4.3, 0.85], abs=0.06) and behind == pytest.approx([3.65, 1.5], abs=0.06)
 
 
-def test_nobody_hides_behind_walls_legs_and_narrow_poles():
+def test_walls_legs_and_narrow_poles_hide_no_people():
     assert not len(corners_from(0.0, furniture=()))
     assert not len(corners_from(0.0, furniture=[dict(PILLAR, size=[LEAST_WIDTH_M - 0.05] * 2 + [2.2])]))
     assert not len(corners_from(0.0, furniture=(), people_m=[(2.0, 0.5), (1.0, -1.0)]))
 
 
-def test_nobody_hides_between_a_wall_and_what_stands_close_to_it():
+def test_an_obstacle_close_to_a_wall_hides_no_people():
     assert not len(corners_from(0.0, furniture=[{'at': [4.0, 3.9], 'size': [1.0, 0.2, 2.0]}]))
 
 
@@ -77,7 +77,7 @@ def stopped_before(speed_mps, corner_m, people_mps):
 
 @settings(deadline=None, max_examples=200)
 @given(st.floats(0.5, 5), st.floats(-3, 3), st.floats(0.2, 2.5))
-def test_the_robot_stops_before_whoever_comes_from_the_corner(x, y, people_mps):
+def test_the_robot_stops_before_people_from_the_corner(x, y, people_mps):
     speed_mps = speed_at(0.0, [x, y], CornerParams(emerging_speed=people_mps))
     if speed_mps > CORNERS.corner_speed:
         assert stopped_before(speed_mps, [x, y], people_mps)

@@ -56,7 +56,7 @@ class TrackerNodeParams(NamedTuple):
     camera_timeout: float = Param(
         1.0, 'With several cameras, no tracks are published while there are no boxes of one of them for this time, so '
         'that planners stop. Detectors must publish empty arrays, too (publish_empty). 0: the tracks of the other '
-        'cameras are published, and planners drive on as if the silent one saw nobody.', 's')
+        'cameras are published, and planners drive on as if the silent one saw no people.', 's')
     use_map: bool = Param(False, 'Whether no track starts in occupied cells of the static map.', section=SET_BY_LAUNCH)
 
 

@@ -32,7 +32,7 @@ RECENT_NS = NS  # a camera whose latest image is older is ignored
 BEHIND_M = 0.45  # upper bound of the position's standard deviation of a person who stays behind an occluder
 PRESENT_M = 0.3  # the same of one whose place is occupied
 STOPPING_S = 0.5  # time constant of the velocity of a person who does not come as near as predicted
-PRESENT_NS = 30 * NS  # without a detection for longer, what occupies the place may be a wall, which would stay for ever
+PRESENT_NS = 30 * NS  # without a detection for longer, what occupies the place may be a wall, which never leaves
 OCCLUDING_S = 0.3  # a track missed for longer does not occlude others
 
 
