@@ -13,6 +13,8 @@ from ros_3d_bb.core.params import Param, parameters
 MIN_CELLS = 20  # smaller clusters are ignored; a person 6 m away has about 300 cells
 HEADROOM_M = 0.15  # minimum depth of the valley between the heads of two people side by side
 HIP_M = 0.95  # lower peaks do not count: in an image cut above the hips, the legs of one person form a valley, too
+# Smallest height of the top and of the visible part of a person who crouches, sits or bends; chosen.
+LOW_TOP_M, LOW_VISIBLE_M = 0.7, 0.5
 TWO_LAYERS = 0.7  # between-class share of the variance of two depth layers; 0.64 for noise, 0.75 for a slanted wall
 
 
@@ -112,7 +114,7 @@ def grid_of(depth, camera, floor, params):
 
 
 def find_person_clusters(grid, camera, params):
-    """Return (Blob, Shape) of each blob of human size."""
+    """Return (Blob, Shape) of each blob of human size, of people who crouch, too."""
     clusters = _merge_stacked(_split_blobs(grid, camera, params), grid, camera, params)
     return [(blob, shape) for blob, shape in clusters if _is_human(shape, params)]
 
@@ -153,11 +155,16 @@ def quantile_of(values, share):
 
 def _is_human(shape, params):
     cut = 0.6 if shape.cut_side else 1.0
-    visible_m = params.min_visible_cut if shape.cut_top else params.min_visible
     return (cut * params.min_width <= shape.width_m <= params.max_width
-            and shape.thickness_m <= params.max_thickness and shape.top_m - shape.bottom_m >= visible_m
-            and (shape.cut_top or params.min_top <= shape.top_m) and shape.top_m <= params.max_top
+            and shape.thickness_m <= params.max_thickness and shape.top_m - shape.bottom_m >= LOW_VISIBLE_M
+            and (shape.cut_top or LOW_TOP_M <= shape.top_m) and shape.top_m <= params.max_top
             and (shape.cut_bottom or shape.bottom_m <= params.max_bottom))
+
+
+def is_standing(shape, params):
+    """Whether a blob of human size is as high as a standing person."""
+    visible_m = params.min_visible_cut if shape.cut_top else params.min_visible
+    return shape.top_m - shape.bottom_m >= visible_m and (shape.cut_top or params.min_top <= shape.top_m)
 
 
 def _connected(cells, row=0, column=0):
