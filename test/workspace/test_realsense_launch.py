@@ -28,11 +28,11 @@ def test_exposure_is_automatic_or_in_the_units_of_the_sensor(camera_package):
 def test_without_the_driver_our_node_reads_the_camera_with_the_same_names():
     parameters, nodes = loaded('realsense.launch', 'driver:=pyrealsense2', 'camera:=front', 'width:=848', 'fps:=15',
                                'filters:=spatial', 'exposure:=0.008')
-    assert set(nodes) == {'realsense_node'} and '/use_sim_time' not in parameters
+    assert set(nodes) == {'front_realsense_node'} and '/use_sim_time' not in parameters
     expected = {'frame_prefix': 'front', 'width': 848, 'height': 480, 'fps': 15, 'filters': 'spatial',
                 'exposure': 0.008, 'file': '', 'publish_clock': False}
-    assert {name: parameters['/realsense_node/' + name] for name in expected} == expected
-    assert dict(nodes['realsense_node'].remap_args) == {'camera/' + topic: 'front/' + topic for topic in (
+    assert {name: parameters['/front_realsense_node/' + name] for name in expected} == expected
+    assert dict(nodes['front_realsense_node'].remap_args) == {'camera/' + topic: 'front/' + topic for topic in (
         'color/image_raw', 'color/camera_info', 'aligned_depth_to_color/image_raw',
         'aligned_depth_to_color/camera_info')}
 
