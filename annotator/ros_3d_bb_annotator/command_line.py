@@ -4,7 +4,7 @@ import sys
 
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.export import default_estimator, export
-from ros_3d_bb_annotator.validation import leftovers_of, problems_of
+from ros_3d_bb_annotator.validation import problems_of
 
 
 def main(arguments=None):
@@ -54,10 +54,6 @@ def _validate(document):
     problems = list(problems_of(document))
     for problem in problems:
         print(problem)
-    leftovers = leftovers_of(document)
-    if leftovers:
-        print('annotator: note: no measurement refers to %s; these files may be left from a killed program, and can be '
-              'deleted if no program uses the session' % ', '.join(leftovers), file=sys.stderr)
     done, total = document.progress
     print('%s: %d measurements, %d annotated or rejected, %d problem%s'
           % (document.folder, total, done, len(problems), '' if len(problems) == 1 else 's'))

@@ -42,7 +42,6 @@ class Document(object):
         self.camera = self._session.camera
         self._content, self._signature = {'frames': []}, None
         self._undo, self._redo, self._annotated = [], [], []
-        self._drafts = {}  # fields by the ID of the measurement
         self.estimates = Estimates(self)
         self._update(content)
 
@@ -158,14 +157,11 @@ class Document(object):
             raise ValueError('truth z is %g m; more than 0 expected, as the camera looks along z' % z_m)
         truth_mm = truth_entry(x_m, z_m, y_m)
         self._edit(*((index, self._changes_with_truth(index, truth_mm)) for index in indices))
-        for index in indices:
-            self._annotated.append(index)
-            self.set_draft(index, {})
+        self._annotated.extend(indices)
 
     def clear_truth(self, index):
         """Remove the truth of the selected person."""
         self._edit((index, {'truth_mm': None}))
-        self.set_draft(index, {})
 
     def last_truth(self, index):
         """Truth (x, y, z) of the last annotated measurement, or else of the nearest one before `index`."""
@@ -224,8 +220,6 @@ class Document(object):
         if not reason.strip():
             raise ValueError('a reason is needed to reject a measurement')
         self._edit(*((index, {'rejected': reason.strip()}) for index in indices))
-        for index in indices:
-            self.set_draft(index, {})
 
     def restore(self, index):
         self._edit((index, {'rejected': None}))
@@ -248,13 +242,6 @@ class Document(object):
     def redo(self):
         """Redo the last undone edit. Returns the same as `undo`."""
         return self._step(self._redo, self._undo)
-
-    def draft(self, index):
-        """Draft of a measurement, the text that was typed but not entered: {name of a field: text}."""
-        return self._drafts.get(self.measurements[index].id, {})
-
-    def set_draft(self, index, fields):
-        self._drafts[self.measurements[index].id] = {name: text for name, text in fields.items() if text}
 
     def _drawn(self, index, box_px):
         """Clip a box to the image. Returns it and its estimate."""

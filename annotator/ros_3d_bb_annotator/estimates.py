@@ -17,11 +17,6 @@ class Estimates(object):
         self._document, self._known = document, {}
         self.update()
 
-    def clear(self):
-        """Forget all estimates, because images have changed."""
-        self._known.clear()
-        self.update()
-
     def update(self):
         """Adapt to changed measurements."""
         self._people = self._likely = self._implausible = None

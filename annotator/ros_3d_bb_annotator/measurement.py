@@ -5,7 +5,6 @@ from typing import NamedTuple, Optional, Tuple
 from ros_3d_bb.sessions.session_reader import RecordedDetection, SessionError, frame_of, session_errors
 
 NEW, ANNOTATED, REJECTED, NOBODY = 'new', 'annotated', 'rejected', 'nobody found'
-STATES = NEW, NOBODY, ANNOTATED, REJECTED
 # Field of the stretched depth of the old format. Its name differs from that of depth in metric units.
 STRETCHED_DEPTH = 'stretched_depth'
 
@@ -39,7 +38,7 @@ class EditedMeasurement(NamedTuple):
 
     @property
     def state(self):
-        """One of STATES."""
+        """NEW, ANNOTATED, REJECTED or NOBODY."""
         if self.rejected is not None:
             return REJECTED
         if not self.detections and self.problem is None:

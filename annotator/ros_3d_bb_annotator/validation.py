@@ -1,9 +1,7 @@
 """Validation of sessions: readable images, boxes inside the image, plausible estimates and truth."""
 import collections
-import os
-import pathlib
 
-from ros_3d_bb.sessions.session_reader import SessionError, read_description
+from ros_3d_bb.sessions.session_reader import SessionError
 from ros_3d_bb_annotator.measurement import REJECTED
 
 HALF_PERSON_M = 0.5  # the body of a person whose axis is just outside the image may be visible
@@ -19,18 +17,6 @@ def problems_of(document):
         if measurement.state != REJECTED:
             for problem in _problems_at(document, index):
                 yield '%s: %s' % (measurement.id or 'measurement number %d' % (index + 1), problem)
-
-
-def leftovers_of(document):
-    """Sorted relative paths of files that no measurement refers to, such as those left by a killed program."""
-    if document.is_old_format:
-        return []
-    folder = pathlib.Path(document.folder)
-    paths = [*folder.glob('.*.tmp'), *folder.glob('color/*'), *folder.glob('depth/*')]
-    # read after the files are listed, because a viewer may add measurements concurrently
-    entries = [entry for entry in read_description(folder)['frames'] if isinstance(entry, dict)]
-    used = set(os.path.normpath(str(entry.get(kind, ''))) for entry in entries for kind in ('color', 'depth'))
-    return sorted(set(str(path.relative_to(folder)) for path in paths) - used)
 
 
 def _problems_at(document, index):

@@ -150,12 +150,3 @@ def test_boxes_are_replaced_and_deleted_with_their_truth(document, folder):
 
 def opened(folder):
     return Document.open(folder).measurements
-
-
-def test_drafts_are_kept_until_the_truth_is_entered(document):
-    document.set_draft(1, {'x': '12', 'z': ''})
-    document.set_draft(2, {'reason': 'blu'})
-    assert document.draft(1) == {'x': '12'} and document.draft(2) == {'reason': 'blu'} and document.draft(0) == {}
-    document.set_truth(1, 0.12, 2.0)
-    document.reject(2, 'blurred')
-    assert document.draft(1) == document.draft(2) == {}
