@@ -7,7 +7,7 @@ MANY = 500  # measurements, of which a single one has no influence on the likely
 
 
 class Estimates(object):
-    """Estimates of the boxes of a document from its depth images; in the old format, the recorded positions.
+    """Estimates of the boxes of a document from its depth images.
 
     They are computed once for the boxes of a measurement. `known`, `outlier` and `implausible` use what has been
     computed.

@@ -5,8 +5,6 @@ from typing import NamedTuple, Optional, Tuple
 from ros_3d_bb.sessions.session_reader import RecordedDetection, SessionError, frame_of, session_errors
 
 NEW, ANNOTATED, REJECTED, NOBODY = 'new', 'annotated', 'rejected', 'nobody found'
-# Field of the stretched depth of the old format. Its name differs from that of depth in metric units.
-STRETCHED_DEPTH = 'stretched_depth'
 
 
 class Mark(NamedTuple):
@@ -100,9 +98,7 @@ def measurement_of(folder, entry, files):
     known = entry if isinstance(entry, dict) else {}
     try:
         with session_errors('frames.json'):
-            if known.get('unreadable'):
-                raise SessionError(str(known['unreadable']))
-            frame = frame_of(folder, dict(entry, depth=entry[STRETCHED_DEPTH]) if STRETCHED_DEPTH in known else entry)
+            frame = frame_of(folder, entry)
     except SessionError as error:
         return EditedMeasurement(str(known.get('id', '')), '', '', problem=str(error),
                                  rejected=str(known['rejected']) if known.get('rejected') else None)

@@ -32,6 +32,7 @@ class MeasurementPane(QtWidgets.QWidget):
         self.shared, self.truth, self.floor = SharedView(self), TruthPanel(), GridView()
         self.color_view, self.depth_view = ImageView('colour', self.shared), ImageView('depth', self.shared)
         self.header, self.banner = _label(), _label()
+        self.banner.setText(NOBODY_TEXT)
         self.readout = QtWidgets.QLabel()
         self.people, self.buttons = QtWidgets.QListWidget(), QtWidgets.QHBoxLayout()
         self._document, self._measurement, self._shown, self._shown_images, self._index = (None,) * 5
@@ -56,7 +57,7 @@ class MeasurementPane(QtWidgets.QWidget):
         """Set the document. No measurement is shown yet."""
         self._document, self._measurement, self._shown, self._shown_images = document, None, None, None
         self.header.setText('This session contains no measurements yet.')
-        self._show_banner(document.notes)
+        self.banner.hide()
 
     def show_measurement(self, number):
         """Show a measurement, also if it has changed. The text that is typed for it remains."""
@@ -68,7 +69,7 @@ class MeasurementPane(QtWidgets.QWidget):
         pictures = self._shown
         self._document.estimates.of(number, pictures.depth)
         self._show_header(measurement)
-        self._show_banner(self._document.notes + (NOBODY_TEXT,) * (measurement.state == NOBODY))
+        self.banner.setVisible(measurement.state == NOBODY)
         image = pictures.color_image or pictures.depth_image
         if image is not None:
             self.shared.show_size(image.width(), image.height())
@@ -103,10 +104,6 @@ class MeasurementPane(QtWidgets.QWidget):
             if box.rect_px[0] < box.rect_px[2] and box.rect_px[1] < box.rect_px[3])
         return Scene(tuple(boxes), self._measurement.person, samples)
 
-    def _show_banner(self, texts):
-        self.banner.setText('<br>'.join(html.escape(text) for text in texts))
-        self.banner.setVisible(bool(texts))
-
     def _show_people(self, measurement):
         self.people.clear()
         positions = self._document.estimates.of(self._index)
@@ -139,7 +136,7 @@ class MeasurementPane(QtWidgets.QWidget):
             float(position_m[0]) - truth_m[0], float(position_m[2]) - truth_m[2])
         self.truth.show_error(error_text(error_m), warning)
         camera = document.camera
-        sight = (0.0, 0.0) if camera is None else (-camera.cx / camera.fx, (camera.width - camera.cx) / camera.fx)
+        sight = -camera.cx / camera.fx, (camera.width - camera.cx) / camera.fx
         self.floor.show_scene(FloorScene(
             document.grid, None if truth_m is None else (truth_m[0], truth_m[2]),
             None if position_m is None else tuple(position_m[[0, 2]].tolist()), sight))

@@ -20,19 +20,9 @@ class Pictures(NamedTuple):
 def read_pictures(document, number):
     """Read the Pictures of a measurement."""
     color, color_problem = _read_or_error(document.color, number)
-    if document.is_old_format:
-        depth, (stretched, depth_problem) = None, _read_or_error(document.stretched_depth, number)
-        shown = None if stretched is None else _grey_image(stretched)
-    else:
-        depth, depth_problem = _read_or_error(document.depth, number)
-        shown = None if depth is None else colorize_depth(depth_to_grey(depth, DEPTH_RANGE_M))
+    depth, depth_problem = _read_or_error(document.depth, number)
+    shown = None if depth is None else colorize_depth(depth_to_grey(depth, DEPTH_RANGE_M))
     return Pictures(_image_of(color), color_problem, _image_of(shown), depth_problem, depth)
-
-
-def _grey_image(values):
-    """Convert an image (height, width), uint8 or uint16, to RGB, (height, width, 3), uint8."""
-    grey = values if values.dtype == np.uint8 else (values // 256).astype(np.uint8)
-    return np.repeat(grey[..., None], 3, axis=2)
 
 
 def _image_of(rgb):

@@ -2,7 +2,8 @@
 import os
 
 from ros_3d_bb_annotator import dialogs
-from ros_3d_bb_annotator.export import default_estimator, export
+from ros_3d_bb_annotator.document import ESTIMATOR
+from ros_3d_bb_annotator.export import export
 from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets
 
 
@@ -42,7 +43,7 @@ class Results(QtCore.QObject):
         """Write the table of errors to a file, or show an error message."""
         document = self._window.document
         try:
-            count = export(document, path, default_estimator(document))
+            count = export(document, path, ESTIMATOR)
         except (ValueError, OSError) as error:
             dialogs.show_error(self._window, 'The table was not written', error)
             return

@@ -25,9 +25,6 @@ def _problems_at(document, index):
         return [measurement.problem]
     try:
         document.color(index)
-        if document.is_old_format:
-            document.stretched_depth(index)
-            return _problems_of_truths(document, index)
         document.depth(index)
     except SessionError as error:
         return [str(error)]
@@ -79,8 +76,6 @@ def view_problems(document, truth_m):
     x_m, _y_m, z_m = truth_m
     if not z_m > 0:
         return ['truth z is %g m; more than 0 expected' % z_m]
-    if document.camera is None:
-        return []
     left_m, right_m = document.camera.deproject(
         [(0, document.camera.cy), (document.camera.width, document.camera.cy)], z_m)[:, 0]
     if left_m - HALF_PERSON_M <= x_m <= right_m + HALF_PERSON_M:
