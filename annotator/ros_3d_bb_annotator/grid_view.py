@@ -10,7 +10,7 @@ GROUND, LINES, CAMERA, TEXT = (QtGui.QColor(*color) for color in (
 SIGHT, MARK, POINTED = QtGui.QColor(60, 120, 200, 22), QtGui.QColor(150, 150, 150), QtGui.QColor(0, 114, 178)
 TRUTH, ESTIMATE = QtGui.QColor(0, 90, 170), QtGui.QColor(213, 94, 0)
 MARGIN_PX, REACH_PX = 22, 16
-MARK_PX, NAME_PX = 6, 12  # radius of a mark, height of its name
+MARK_PX, NAME_PX = 5, 11  # radius of a mark, height of its name
 STEPS_M = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 
 

@@ -193,7 +193,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         split.addWidget(self.list)
         split.addWidget(self.pane)
         split.setStretchFactor(1, 1)
-        split.setSizes([self.width() * 28 // 100, self.width() * 72 // 100])
+        split.setSizes([self.width() * 31 // 100, self.width() * 69 // 100])
         self.setCentralWidget(split)
         for name in ('same_as_last', 'enter_for_label', 'ask_reject'):
             button = QtWidgets.QToolButton()
