@@ -51,7 +51,7 @@ class DepthPeople(object):
 
     def reconfigure(self, params):
         """Change the DepthPeopleParams. If two contradict each other, raise ValueError and keep the old ones."""
-        for name in ('depth', 'width', 'top', 'camera_height'):
+        for name in ('depth', 'camera_height'):
             low, high = getattr(params, 'min_%s' % name), getattr(params, 'max_%s' % name)
             if not low < high:
                 raise ValueError('min_%s is %g and max_%s is %g; min_%s must be smaller'
