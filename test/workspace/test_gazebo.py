@@ -15,7 +15,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 CAMERA = os.path.join(ROOT, 'urdf', 'd435i.urdf.xacro')
 CAMERA_POSITION = (0.17, 0.0, 0.20)  # in base_link, thesis 3.5.1
 FX, WIDTH, HEIGHT = 614.686, 640, 480  # camera_info of the D435i of the thesis
-OWN_ARGUMENTS = {'world', 'gui', 'x', 'y', 'yaw', 'fps', 'lockstep', 'navigation'}
+OWN_ARGUMENTS = {'world', 'gui', 'x', 'y', 'yaw', 'fps', 'paused', 'lockstep', 'joystick', 'navigation'}
 
 
 def default_of(launch_file):
@@ -86,7 +86,8 @@ def test_the_launch_file_starts_gazebo_the_robot_and_the_pipeline(tmp_path):
     parameters = dumped('gazebo.launch', tmp_path, 'weights:=/some/yolov5n.pt', 'gui:=false', 'y:=-1.5', 'yaw:=0.3')
     given = given_to_stand_ins(parameters)
     assert os.path.samefile(given.pop('world_name'), os.path.join(ROOT, 'worlds', 'people.world'))
-    assert given == {'gui': 'false', 'x': '0.0', 'y': '-1.5', 'yaw': '0.3', 'z': '0.1', 'joystick': 'false'}
+    assert given == {'gui': 'false', 'x': '0.0', 'y': '-1.5', 'yaw': '0.3', 'z': '0.1', 'joystick': 'false',
+                     'paused': 'false'}
     assert 'camera_color_optical_frame' in parameters['/robot_description']
     assert parameters['/yolov5_node/weights'] == '/some/yolov5n.pt'
     assert parameters['/tracker_node/target_frame'] == 'odom'
