@@ -37,7 +37,7 @@ ALLOWED = {
         'camera conversions core detection.yolov5 pipeline sessions',
         'genpy rosbag sensor_msgs std_msgs tf2_msgs tf2_ros yaml'),
     'ros_3d_bb.diagnosis': (
-        'bags camera conversions core msg pipeline',
+        'bags camera conversions core detection.depth msg pipeline',
         'genpy sensor_msgs std_msgs tf2_msgs tf2_ros yaml'),
     'ros_3d_bb.nodes.common': (
         'camera conversions core diagnosis msg pipeline planning visualization',

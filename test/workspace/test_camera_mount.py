@@ -1,4 +1,7 @@
 """Cameras that are rotated, tilted, or without tf: the same positions as from an upright camera on a robot."""
+import argparse
+import re
+
 import numpy as np
 import pytest
 import rosbag
@@ -20,6 +23,7 @@ from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, time_from, t
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import Detections
 from ros_3d_bb.nodes.camera_pose_node import CameraPoseNode
+from ros_3d_bb.nodes.doctor import bag_findings
 from ros_3d_bb.pipeline.detection_stage import CameraRotation, Yolov5NodeParams, detect_in_color
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
@@ -119,6 +123,38 @@ def test_the_roll_of_a_camera_is_given_or_fitted_to_the_floor(rolled):
         tracks_m = np.array([track.position_m[:2] for track in last])
         apart_m = np.linalg.norm(tracks_m[:, None] - truth_m, axis=2)
         assert apart_m.shape == (3, 3) and apart_m.min(axis=0).max() < 0.15, options
+
+
+def doctor_on(path):
+    """The facts and faults {subject: text} that the doctor finds in a bag, and the next command."""
+    given = argparse.Namespace(bag=str(path), camera='', target_frame='', depth='aligned')
+    found, command, _purpose = bag_findings(given)
+    return {finding.subject: finding.fault or finding.fact for finding in found}, command
+
+
+def test_the_doctor_fits_height_tilt_and_roll_to_the_floor(rolled):
+    found, command = doctor_on(rolled[0] / 'in.bag')
+    assert 'image rotation' not in found
+    options = re.search(r'--camera-height (\S+) --camera-tilt (\S+) --camera-roll (\S+)', command)
+    height_m, *angles_rad = map(float, options.groups())
+    assert height_m == pytest.approx(HEIGHT_M, abs=0.05)
+    assert angles_rad == pytest.approx([TILT_RAD, ROLL_RAD], abs=np.radians(1))
+    assert found['floor'].startswith('the camera is %.2f m above it' % height_m)
+
+
+@pytest.mark.parametrize('turns, late_ns', [(1, 0), (2, 0), (3, 0), (3, 20000000)])
+def test_the_doctor_notices_a_rotated_camera_without_tf(recorded, tmp_path, turns, late_ns):
+    """Whether or not its colour and depth images have the same stamps."""
+    recorded(tmp_path / 'same.bag', turns, with_tf=False)
+    with rosbag.Bag(str(tmp_path / 'same.bag')) as before, rosbag.Bag(str(tmp_path / 'in.bag'), 'w') as after:
+        for topic, message, time in before.read_messages():
+            if topic == '/' + DEPTH_TOPIC:
+                message.header.stamp = time = time_from(time.to_nsec() + late_ns)
+            after.write(topic, message, time)
+    found, command = doctor_on(tmp_path / 'in.bag')
+    assert 'turned clockwise by %d degrees' % (90 * turns) in found['image rotation']
+    options = re.search(r'--camera-height (\S+) --camera-tilt (\S+) --image-rotation (\d+)', command)
+    assert list(map(float, options.groups())) == pytest.approx([HEIGHT_M, TILT_RAD, 90 * turns], abs=0.02)
 
 
 class PoseRig(object):

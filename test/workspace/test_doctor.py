@@ -5,6 +5,7 @@ import subprocess
 import sys
 from unittest import mock
 
+import cv2
 import numpy as np
 import pytest
 import rosbag
@@ -14,7 +15,6 @@ from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
 from ros_3d_bb.bags.bag_writer import write_bag
-from ros_3d_bb.bags.process_bag import main as process_bag
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth
 from ros_3d_bb.nodes.common.graph_observer import GraphObserver
 from ros_3d_bb.nodes.doctor import bag_findings, machine_findings
@@ -44,7 +44,7 @@ def changed(bag, folder, change):
 
 
 def found_in(path, camera='', target_frame='', depth='aligned'):
-    return bag_findings(argparse.Namespace(bag=str(path), camera=camera, target_frame=target_frame, depth=depth))
+    return bag_findings(argparse.Namespace(bag=str(path), camera=camera, target_frame=target_frame, depth=depth))[0]
 
 
 def faults_in(path, **options):
@@ -128,6 +128,29 @@ def test_names_of_topics_are_given_as_remappings(bag, tmp_path, monkeypatch):
     assert faults_in(changed(bag, tmp_path, renamed)) == []
 
 
+def of_another_driver(topic, message):
+    if topic in ('/ground_truth', '/yolo_bounding_box'):
+        return '/another' + topic, message
+    return (topic.replace('/camera/color', '/cam0/rgb')
+            .replace('/camera/aligned_depth_to_color', '/cam0/depth_to_rgb'), message)
+
+
+def next_command_in(command, folder):
+    """The next command that a command of the doctor prints; empty if there is none."""
+    printed = subprocess.run(['bash', '-c', command], cwd=str(folder), stdout=subprocess.PIPE, universal_newlines=True)
+    return ''.join(line[len('next: '):] for line in printed.stdout.splitlines() if line.startswith('next: '))
+
+
+def test_next_commands_lead_from_a_bag_to_a_picture_of_its_tracks(bag, tmp_path):
+    again = next_command_in('rosrun ros_3d_bb doctor ' + changed(bag, tmp_path, of_another_driver), tmp_path)
+    assert 'camera/aligned_depth_to_color/image_raw:=/cam0/depth_to_rgb/image_raw' in again
+    process = next_command_in(again, tmp_path)
+    assert 'process_bag' in process and next_command_in(process, tmp_path) == ''
+    picture = cv2.imread(str(tmp_path / 'tracked.png'))
+    assert (picture == [60, 220, 40]).all(axis=2).any()  # 2D boxes in the images of that topic
+    assert 'scene_report' in next_command_in('rosrun ros_3d_bb doctor tracked.bag', tmp_path)
+
+
 RAW, RAW_INFO = '/front/depth/image_rect_raw', '/front/depth/camera_info'
 
 
@@ -149,11 +172,16 @@ def raw_in_place(topic, message):
     return {RAW: DEPTH, RAW_INFO: DEPTH_INFO}.get(name, name), message
 
 
-@pytest.mark.parametrize('change, subject', [(raw_only, 'depth images'), (raw_in_place, 'alignment')])
-def test_raw_depth_is_not_taken_for_aligned_depth(bag, tmp_path, change, subject):
+@pytest.mark.parametrize('change, subject, topic', [(raw_only, 'depth images', RAW),
+                                                    (raw_in_place, 'alignment', DEPTH)])
+def test_raw_depth_is_not_taken_for_aligned_depth(bag, tmp_path, change, subject, topic):
     path = changed(bag, tmp_path, change)
     fault = faults_in(path)[0]
     assert fault.subject == subject and 'camera_depth:=' not in fault.fix and 'depth:=raw' in fault.fix
+    again = next_command_in('rosrun ros_3d_bb doctor ' + path, tmp_path)
+    assert 'doctor' in again and '--depth raw' in again and 'camera/depth/image_rect_raw:=' + topic in again
+    process = next_command_in(again, tmp_path)
+    assert '--detector depth --depth raw' in process and '--camera-' not in process
 
 
 def raw_alone(topic, message):
@@ -164,13 +192,18 @@ def raw_alone(topic, message):
     return topic, message
 
 
-def test_the_pose_of_a_raw_camera_alone_is_fitted_to_the_floor(bag, tmp_path, capfd):
-    with pytest.raises(SystemExit) as ended:
-        process_bag([changed(bag, tmp_path, raw_alone), str(tmp_path / 'tracked.bag'), '--detector', 'depth', '--depth',
-                     'raw', '--camera-pose', 'floor', '--remap', 'camera/depth/image_rect_raw:=' + RAW,
-                     '--remap', 'camera/depth/camera_info:=' + RAW_INFO])
-    printed = capfd.readouterr().out
-    assert not ended.value.code and 'the camera is 0.2' in printed and 'images with tracks' in printed
+def test_the_pose_of_a_raw_camera_alone_is_fitted_to_the_floor(bag, tmp_path):
+    process = 'rosrun ros_3d_bb doctor ' + changed(bag, tmp_path, raw_alone)
+    for _step in range(2):
+        process = next_command_in(process, tmp_path)
+    assert '--detector depth --depth raw' in process and '--camera-pose floor' in process
+    printed = subprocess.run(['bash', '-c', process], cwd=str(tmp_path), stdout=subprocess.PIPE,
+                             universal_newlines=True)
+    assert 'the camera is 0.2' in printed.stdout and 'images with tracks' in printed.stdout
+
+
+def test_there_is_no_next_command_before_a_fault_is_fixed(bag, tmp_path):
+    assert next_command_in('rosrun ros_3d_bb doctor ' + changed(bag, tmp_path, metres), tmp_path) == ''
 
 
 def of_front(topic, message):

@@ -177,8 +177,8 @@ def _why_no_tracks(events, placed):
         return 'none of %d 3D boxes was confirmed by later images' % counts['boxes estimated']
     if counts.get('boxes without depth'):
         return 'none of %d 2D boxes has depth' % counts['boxes without depth']
-    return ('no people were detected; rosrun ros_3d_bb doctor BAG checks the images; if they are not upright, give '
-            '--image-rotation')
+    return ('no people were detected; rosrun ros_3d_bb doctor BAG checks the images and the orientation of the camera '
+            '(--image-rotation)')
 
 
 def _names(remaps):

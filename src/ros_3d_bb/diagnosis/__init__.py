@@ -1,4 +1,4 @@
 """Diagnosis of a running graph or a bag: observations, checks, and findings with suggested fixes.
 
-May import: bags, camera, conversions, core, msg.
+May import: bags, camera, conversions, core, detection.depth, msg.
 """

@@ -40,7 +40,7 @@ def role_named(name, kind):
 
 def findings(seen):
     """Run all checks of an `Observations`. Returns a list of Finding."""
-    checks = (_clock, _images, _camera, _alignment, _encodings, _stamps, _pairs_of_images, _transforms,
+    checks = (_clock, _images, _camera, _alignment, _encodings, _stamps, _pairs_of_images, _transforms, _mount,
               _pairs_of_boxes, _results)
     found = [finding for check in checks for finding in check(seen)]
     return found + list(_nodes(seen, any(finding.fault for finding in found)))
@@ -198,6 +198,20 @@ def _transforms(seen):
         yield Finding('transforms', '', fault, fix or 'inspect the tree with rosrun tf view_frames')
     else:
         yield Finding('transforms', '%s to %s is available at the stamp of the image' % (source, target))
+
+
+def _mount(seen):
+    """Report how a camera without the pose in tf is mounted, and whether its images must be rotated."""
+    mount = seen.mount
+    if mount is None:
+        return
+    if mount.turns:
+        yield Finding('image rotation', '', '%d people are found in %d images, and %d if they are turned clockwise by '
+                      '%d degrees' % (mount.people[0], mount.images, mount.people[mount.turns], 90 * mount.turns),
+                      'pass image_rotation:=%d (process_bag: --image-rotation %d)' % (2 * (90 * mount.turns,)))
+    if mount.pose is not None:
+        yield Finding('floor', 'the camera is %.2f m above it, tilted by %.2f rad and rolled by %.2f rad; fitted to '
+                      'the depth images' % mount.pose)
 
 
 def _pairs_of_boxes(seen):

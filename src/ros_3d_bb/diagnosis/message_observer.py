@@ -10,17 +10,18 @@ from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.bags.bag_reader import BagReader, message_in
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
-from ros_3d_bb.camera.alignment import EdgeComparison, frames_fault
+from ros_3d_bb.camera.alignment import EdgeComparison, frames_fault, size_fault
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, IMAGE_KINDS, STATIC_TOPIC, TF_TOPIC, uncompressed
 from ros_3d_bb.conversions.image_msgs import DEPTH_SCALES, imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, camera_from_msg, time_from
 from ros_3d_bb.core.time_sync import NS, SAME_NS
+from ros_3d_bb.diagnosis.camera_mount import camera_mount
 from ros_3d_bb.diagnosis.checks import COLOR, DEPTH, INFO, ROLES
 from ros_3d_bb.diagnosis.observations import COMPRESSED_IMAGE, IMAGE, KEPT, Newest, Observations, Stream, TfSeen
 from ros_3d_bb.diagnosis.tf_tree import links_in
 from ros_3d_bb.pipeline.depth_registration import RAW
 
-COMPARED_NS = NS // 4  # between two images that are compared
+COMPARED_NS, PAIRS = NS // 4, 16  # between two images that are kept and compared; number of those that are kept
 BAG_SECONDS = 10.0  # cache length of tf2
 
 
@@ -28,20 +29,33 @@ class EdgeObserver(object):
     """Compare the edges of colour and depth images with the same stamp, at most every `COMPARED_NS`."""
 
     def __init__(self, color, depth):
-        self._edges, self._color, self._depth, self._compared_ns = EdgeComparison(), color, depth, None
-        self.fault = self._edges.fault  # a sentence if the edges disagree, '' otherwise
+        self._edges, self._color, self._depth = EdgeComparison(), color, depth
+        self._same, self._near = (collections.deque(maxlen=PAIRS) for _kind in range(2))  # (stamp, RGB, DepthImage)
         color.on_message = depth.on_message = self._compare
+
+    @property
+    def pairs(self):
+        """Up to `PAIRS` colour images, RGB, with the DepthImage of their stamp or, if the camera does not synchronize
+        its images, of a stamp at most `COMPARED_NS` away."""
+        return [pair[1:] for pair in self._same or self._near]
+
+    def fault(self):
+        """Return a sentence if the edges disagree, '' otherwise."""
+        return self._edges.fault()
 
     def _compare(self):
         color, depth = self._color.newest, self._depth.newest
         if color is None or depth is None:
             return
-        stamp_ns = color.header.stamp.to_nsec()
-        is_same = abs(stamp_ns - depth.header.stamp.to_nsec()) <= SAME_NS
-        if is_same and (self._compared_ns is None or abs(stamp_ns - self._compared_ns) >= COMPARED_NS):
+        stamp_ns, depth_stamp_ns = color.header.stamp.to_nsec(), depth.header.stamp.to_nsec()
+        is_same = abs(stamp_ns - depth_stamp_ns) <= SAME_NS
+        pairs = self._same if is_same else self._near
+        is_near = not self._same and abs(stamp_ns - depth_stamp_ns) <= COMPARED_NS
+        if (is_same or is_near) and not (pairs and abs(stamp_ns - pairs[-1][0]) < COMPARED_NS):
             with contextlib.suppress(ValueError):  # reported as an invalid encoding
-                self._edges.add(imgmsg_to_rgb(color), imgmsg_to_depth(depth))
-                self._compared_ns = stamp_ns
+                pairs.append((stamp_ns, imgmsg_to_rgb(color), imgmsg_to_depth(depth)))
+                if is_same:
+                    self._edges.add(*pairs[-1][1:])
 
 
 class Observation(object):
@@ -122,9 +136,18 @@ def observe_bag(path, name_of, target_frame, depth='aligned'):
         _read(reader, observed, depth_info, transforms)
     info = observed[INFO].newest
     frame_id = info.header.frame_id if depth == RAW and info is not None else ''  # that of the 3D boxes
-    return observations_of(observed, depth_info, topics, BAG_SECONDS, is_bag=True, edges_fault=edges.fault(),
+    seen = observations_of(observed, depth_info, topics, BAG_SECONDS, is_bag=True, edges_fault=edges.fault(),
                            tf=observed[DEPTH].tf_seen(transforms.lookup, transforms.frames_as_yaml, target_frame,
-                                                      frame_id), depth_is_raw=depth == RAW, raw_topics=raw_topics)
+                                                      frame_id), depth_is_raw=depth == RAW, raw_topics=raw_topics,
+                           depth_info_topic=depth_info.topic)
+    if depth == RAW:
+        return seen
+    is_aligned = seen.color_info is not None and seen.depth is not None and not (
+        seen.color_info.fault or seen.depth.fault or seen.edges_fault
+        or size_fault(seen.color_info.converted, *seen.depth.converted.shape[::-1]))
+    if is_aligned and edges.pairs and seen.tf is not None and seen.tf.fault:
+        return seen._replace(mount=camera_mount(edges.pairs, seen.color_info.converted))
+    return seen
 
 
 def _raw_topics(reader, topics):

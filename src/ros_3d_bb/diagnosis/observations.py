@@ -77,8 +77,10 @@ class Observations(NamedTuple):
     use_sim_time: bool = False
     clock_count: int = 0  # number of /clock messages
     nodes: dict = {}  # {name: (level, sentence)} from the diagnostics of nodes
+    mount: Any = None  # camera_mount.CameraMount of a camera without the pose in tf
     depth_is_raw: bool = False  # not aligned to colour; the nodes register it
     raw_topics: Tuple[str, ...] = ()  # topics of a bag with depth images that are not aligned to colour
+    depth_info_topic: str = ''  # of the camera_info of depth
     stamp_tolerance_s: float = 0.0
     cache_length_s: float = 1.0
 

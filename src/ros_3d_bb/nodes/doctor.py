@@ -15,6 +15,7 @@ from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.diagnosis.checks import findings
 from ros_3d_bb.diagnosis.message_observer import observe_bag
+from ros_3d_bb.diagnosis.next_command import next_command
 from ros_3d_bb.diagnosis.observations import Finding
 from ros_3d_bb.nodes.common.graph_observer import GraphObserver, name_for, tracker_param
 from ros_3d_bb.nodes.common.master import NO_ANSWER, TIMEOUT_S, patient_master
@@ -27,8 +28,9 @@ EXPORT_IP = 'export ROS_IP with the address by which other machines reach this o
 def main():
     """Run the command. The exit status is 0 if no fault is found and 1 otherwise."""
     arguments = _parser().parse_args(rospy.myargv()[1:])
+    command = purpose = ''
     if arguments.bag:
-        found = bag_findings(arguments)
+        found, command, purpose = bag_findings(arguments)
     else:
         found = machine_findings()
         if not any(finding.fault for finding in found):
@@ -43,12 +45,14 @@ def main():
         print('\n'.join(finding.lines))
     faults = sum(1 for finding in found if finding.fault)
     print('doctor: %s' % {0: 'no faults found', 1: '1 fault found'}.get(faults, '%d faults found' % faults))
+    if command:
+        print('next: %s\n      %s' % (command, purpose))
     sys.stdout.flush()
     sys.exit(1 if faults else 0)
 
 
 def bag_findings(arguments):
-    """Return the findings about a bag."""
+    """Return the findings about a bag, the next command, and what it does; empty if there is none."""
     names = dict(remapping.split(':=') for remapping in sys.argv if ':=' in remapping)
 
     def name_of(topic):
@@ -57,8 +61,9 @@ def bag_findings(arguments):
     try:
         seen = observe_bag(arguments.bag, name_of, arguments.target_frame or 'map', arguments.depth)
     except BagError as error:
-        return [Finding('bag', '', str(error), 'rosbag info %s lists its content' % arguments.bag)]
-    return findings(seen)
+        return [Finding('bag', '', str(error), 'rosbag info %s lists its content' % arguments.bag)], '', ''
+    found = findings(seen)
+    return (found,) + next_command(arguments.bag, seen, found)
 
 
 def graph_findings(arguments):

@@ -1,0 +1,76 @@
+"""The next command on the way from a bag to its tracks, and to a picture of them."""
+from shlex import quote
+
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, DEPTH_TOPICS, info_topic_beside
+from ros_3d_bb.core.params import nearest_name
+from ros_3d_bb.diagnosis.checks import COLOR, DEPTH, IMAGES, TRACKS
+from ros_3d_bb.diagnosis.topic_faults import other_topic
+from ros_3d_bb.pipeline.depth_registration import RAW
+
+MIN_ROLL_RAD = 0.02  # smaller ones are within the error of the fitted floor
+
+
+def next_command(bag, seen, found):
+    """Return the next command for a bag, and what it does; ('', '') if a fault must be fixed first.
+
+    `seen` are the Observations of the bag, and `found` the list of Finding on them.
+    """
+    names = {stream.role.name: stream.topic for stream in seen.streams.values()
+             if stream.count and stream.topic.lstrip('/') != stream.role.name}
+    if seen.depth_is_raw and seen.depth_info_topic.lstrip('/') != DEPTH_TOPICS[RAW][1]:
+        names[DEPTH_TOPICS[RAW][1]] = seen.depth_info_topic
+    option = ' --depth raw' if seen.depth_is_raw else ''
+    missing = [seen.streams[key] for key in IMAGES if not seen.streams[key].count]
+    used = [stream.topic for stream in seen.streams.values() if stream.count]
+    used += () if seen.depth_is_raw else seen.raw_topics
+    others = {stream.role.name: other_topic(stream, seen.topics, used) for stream in missing}
+    color = dict(names, **others).get(seen.streams[COLOR].role.name)
+    report = 'rosrun ros_3d_bb scene_report %s' + (' --color-topic ' + quote(color) if color else '')
+    if seen.streams[TRACKS].count:
+        return report % quote(bag), 'draws the tracks'
+    faults = set(finding.subject for finding in found if finding.fault)
+    raw = _raw_topic(seen, 'alignment' in faults)
+    if not option and raw and ('alignment' in faults or others.get(DEPTH_TOPIC) == ''):
+        names, option = {name: topic for name, topic in names.items() if name != DEPTH_TOPIC}, ' --depth raw'
+        others = dict({name: topic for name, topic in others.items() if name != DEPTH_TOPIC}, **{
+            name: topic for name, topic in zip(DEPTH_TOPICS[RAW], (raw, info_topic_beside(raw)))
+            if topic.lstrip('/') != name})
+        if all(others.values()):
+            return ('rosrun ros_3d_bb doctor %s%s%s' % (quote(bag), option, _remappings(dict(names, **others))),
+                    'checks the raw depth, which process_bag registers to colour')
+    if missing and all(others.values()):
+        return ('rosrun ros_3d_bb doctor %s%s%s' % (quote(bag), option, _remappings(dict(names, **others))),
+                'checks the topics that probably are the missing ones')
+    if missing or faults - {'transforms', 'image rotation'}:
+        return '', ''
+    pose, hint = _pose(seen.mount) if faults else ('', '')
+    command = 'rosrun ros_3d_bb process_bag %s tracked.bag --detector depth%s%s%s && %s' % (
+        quote(bag), option, _remappings(names, ' --remap '), pose, report % 'tracked.bag')
+    return command, 'tracks people and draws them' + hint
+
+
+def _raw_topic(seen, is_misaligned):
+    """Return the topic of raw depth in a bag; empty if there is none."""
+    depth = seen.streams[DEPTH]
+    if is_misaligned and depth.count and not seen.edges_fault:
+        return depth.topic
+    return nearest_name('/' + DEPTH_TOPICS[RAW][0], seen.raw_topics) if seen.raw_topics else ''
+
+
+def _pose(mount):
+    """Return the options for the pose of a camera without tf, from its CameraMount or None, and a hint."""
+    if mount is None:  # of raw depth
+        return ' --camera-pose floor', '; height, tilt and roll of the camera are fitted to the floor in its images'
+    turned = ' --image-rotation %d' % (90 * mount.turns) if mount.turns else ''
+    if mount.pose is None:
+        return (' --camera-height HEIGHT --camera-tilt TILT' + turned,
+                '; fill in the height of the camera above the floor, metres, and its tilt, radians, positive if it '
+                'looks down')
+    height_m, tilt_rad, roll_rad = mount.pose
+    roll = ' --camera-roll %.2f' % roll_rad if abs(roll_rad) > MIN_ROLL_RAD else ''
+    return (' --camera-height %.2f --camera-tilt %.2f%s%s' % (height_m, tilt_rad, roll, turned),
+            '; height and tilt are those of the floor in the depth images: correct them if they are known')
+
+
+def _remappings(names, separator=' '):
+    return ''.join('%s%s:=%s' % (separator, name, topic) for name, topic in sorted(names.items()))
