@@ -50,6 +50,18 @@ def test_invalid_ranges_are_ignored(invalid):
     assert corners_from(2.0, changed=changed) == pytest.approx(corners_from(2.0), abs=2 * HALF_BEAM_M)
 
 
+@pytest.mark.parametrize('first_deg', [-180, -8, 0, 5, 9])
+@pytest.mark.parametrize('step_deg', [1, -1])
+def test_an_obstacle_across_the_ends_of_a_full_circle_has_two_corners(first_deg, step_deg):
+    """As straight ahead of a robot whose laser is mounted backwards."""
+    angles = np.radians(first_deg + step_deg * np.arange(360))
+    ranges_m = np.where(np.cos(angles) >= np.cos(np.radians(8.5)), 2.0, 6.0)
+    corners_m = blind_corners(ranges_m, (0.1, RANGE_M), angles[0], np.radians(step_deg))
+    corner_m = 2.0 * np.cos(np.radians(8)), 2.0 * np.sin(np.radians(8))
+    np.testing.assert_allclose(sorted(corners_m[:, 1]), [-corner_m[1], corner_m[1]])
+    np.testing.assert_allclose(corners_m[:, 0], corner_m[0])
+
+
 def test_a_scan_of_nothing_has_no_corners():
     for ranges_m in ([], [np.inf] * 10, [np.nan] * 10, [1.0]):
         assert blind_corners(ranges_m, (0.1, RANGE_M), 0.0, STEP).shape == (0, 3)

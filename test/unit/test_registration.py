@@ -4,6 +4,7 @@ import pytest
 
 from ros_3d_bb.camera.camera_model import Camera, transform_from
 from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.image_rotation import turned_depth
 from ros_3d_bb.camera.registration import RegisteredDepth, Registration
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from support.cylinders import Cylinder, mounted, rect_of, render
@@ -81,6 +82,15 @@ def test_the_area_with_depth_is_that_of_the_depth_camera():
     left, top, right, bottom = registered(stripe(), COLOR, 0.0, narrow).measured_area()
     assert (left, right) == pytest.approx((319.2 - 614.7 * 79.5 / 160, 319.2 + 614.7 * 79.5 / 160), abs=2)
     assert (top, bottom) == pytest.approx((242.1 - 614.8 * 59.5 / 160, 242.1 + 614.8 * 59.5 / 160), abs=2)
+
+
+def test_the_area_with_depth_is_turned_with_the_image():
+    """The depth camera sees less than the colour camera: people at the border of the area are truncated."""
+    depth = registered(stripe(), COLOR, 0.02, Camera(160, 120, 160.0, 160.0, 79.5, 59.5))
+    left, top, right, bottom = depth.measured_area()
+    assert 0 < left != 640 - right > 0
+    assert turned_depth(depth, 1).measured_area() == (480 - bottom, left, 480 - top, right)
+    assert turned_depth(depth, 2).measured_area() == (640 - right, 480 - bottom, 640 - left, 480 - top)
 
 
 @pytest.mark.parametrize('baseline_m', [0.015, 0.05])

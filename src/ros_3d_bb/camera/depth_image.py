@@ -1,5 +1,5 @@
 """Depth images in the camera's raw units."""
-from typing import NamedTuple
+from typing import NamedTuple, Optional, Tuple
 
 import numpy as np
 
@@ -10,11 +10,13 @@ WIDEST_BORDER, BORDER_STEP = 0.05, 12  # of images without depth: share of the i
 class DepthImage(NamedTuple):
     """A depth image: raw `values` (height, width) of any numeric type; depth in metres is `values` times `scale_m`.
 
-    Depths that are zero, negative, nan, inf or greater than `FARTHEST_M` are invalid.
+    Depths that are zero, negative, nan, inf or greater than `FARTHEST_M` are invalid. `area_px` is its measured area
+    if that is known.
     """
 
     values: np.ndarray
     scale_m: float
+    area_px: Optional[Tuple[int, int, int, int]] = None
 
     @property
     def shape(self):
@@ -37,6 +39,8 @@ class DepthImage(NamedTuple):
         A border of more than `WIDEST_BORDER` of the width or height is not due to registration: its background is far
         away.
         """
+        if self.area_px is not None:
+            return self.area_px
         height, width = self.values.shape
         left, right = _black_ends(self.values[::BORDER_STEP].T)
         top, bottom = _black_ends(self.values[:, ::BORDER_STEP])

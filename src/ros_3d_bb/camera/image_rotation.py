@@ -42,7 +42,10 @@ def turned_image(values, turns):
 
 def turned_depth(depth, turns):
     """A DepthImage or RegisteredDepth that is turned clockwise; of the latter, the whole image is registered."""
-    return DepthImage(turned_image(depth.values, turns), depth.scale_m) if turns else depth
+    if not turns:
+        return depth
+    area_px = turned_boxes(np.array([depth.measured_area()]), turns, *depth.shape[::-1])[0].tolist()
+    return DepthImage(turned_image(depth.values, turns), depth.scale_m, tuple(area_px))
 
 
 def turned_rotation(turns):

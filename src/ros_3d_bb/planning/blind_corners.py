@@ -24,6 +24,9 @@ def blind_corners(ranges_m, limits_m, first_angle, step):
     limited_m = np.minimum(ranges_m, largest_m)
     points_m = scan_points(limited_m, first_angle, step)[limited_m >= least_m]
     limited_m = limited_m[limited_m >= least_m]
+    count = len(limited_m)
+    if abs(step) * (len(ranges_m) + 1) > 2 * np.pi:  # a full circle is taken twice: obstacles across its ends are whole
+        points_m, limited_m = np.tile(points_m, (2, 1)), np.tile(limited_m, 2)
     jumps_m = np.diff(limited_m)
     before, = np.nonzero(np.abs(jumps_m) > LEAST_ROOM_M)  # the last beams on obstacles
     if not len(before):
@@ -31,4 +34,5 @@ def blind_corners(ranges_m, limits_m, first_angle, step):
     first, last = np.append(0, before + 1), np.append(before, len(limited_m) - 1)  # beams on each obstacle
     is_wide = np.linalg.norm(points_m[last] - points_m[first], axis=1) >= LEAST_WIDTH_M
     is_next = (jumps_m[before] < 0).astype(int)  # whether the nearer obstacle is the next one
-    return points_m[before + is_next][is_wide[np.arange(len(before)) + is_next]]
+    corners = (before + is_next)[is_wide[np.arange(len(before)) + is_next]]
+    return points_m[np.unique(corners % count)]

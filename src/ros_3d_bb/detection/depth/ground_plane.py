@@ -42,9 +42,10 @@ class Floor(NamedTuple):
 
     def row(self, camera, column, depth_m):
         """Image row, in pixels, where a column shows the floor at a depth. It may lie outside the image."""
-        x = (column - camera.cx) / camera.fx
+        x = camera.rays(column, camera.cy)[0]
         y = -(self.offset_m / depth_m + self.normal[0] * x + self.normal[2]) / self.normal[1]
-        return y * camera.fy + camera.cy
+        row = camera.project(np.array((x, y, 1.0)))[1]
+        return float(row) if np.isfinite(row) else camera.height  # beyond the fold of a distortion
 
 
 class CameraPose(NamedTuple):

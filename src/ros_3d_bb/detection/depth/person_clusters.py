@@ -3,6 +3,7 @@
 Convention: clusters are found on a subsampled grid of the depth image. The cell (row, column) covers the pixel rows
 [step * row, step * (row + 1)) and the pixel columns [step * column, step * (column + 1)).
 """
+import functools
 from typing import NamedTuple
 
 import cv2
@@ -94,13 +95,17 @@ def grid_of(depth, camera, floor, params):
     depth_m = values.astype(np.float32) * np.float32(depth.scale_m)
     with np.errstate(invalid='ignore'):  # nan
         depth_m[~((depth_m > params.min_depth) & (depth_m < 100))] = 0
-    rows, columns = np.arange(depth_m.shape[0])[:, None], np.arange(depth_m.shape[1])
-    x = (columns * step + step // 2 - camera.cx) / camera.fx
-    y = (rows * step + step // 2 - camera.cy) / camera.fy
+    x, y = _rays(camera, step)
     ahead = np.array([0, 0, 1]) - floor.normal[2] * floor.normal
     ahead /= np.linalg.norm(ahead)
     up_per_m, ahead_per_m = (np.float32(axis[0] * x + axis[1] * y + axis[2]) for axis in (floor.normal, ahead))
     return Grid(depth_m, depth_m * up_per_m + np.float32(floor.offset_m), depth_m * ahead_per_m, step)
+
+
+@functools.lru_cache(maxsize=8)  # undistortion takes longer than the rest
+def _rays(camera, step):
+    """Viewing rays of the cells of a grid, as `Camera.rays`."""
+    return camera.rays(np.arange(step // 2, camera.width, step), np.arange(step // 2, camera.height, step)[:, None])
 
 
 def find_person_clusters(grid, camera, params):
