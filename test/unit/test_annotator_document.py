@@ -58,17 +58,6 @@ def test_truth_is_saved_immediately_and_read_by_benchmarks(document, folder):
     assert Document.open(folder).measurements[2].truth_m == (0.1, -0.05, 2.3)
 
 
-def test_rejected_measurements_are_skipped_and_can_be_restored(document, folder):
-    document.set_truth(0, 0.1, 2.0)
-    document.reject(0, ' arm in front ')
-    assert document.measurements[0].rejected == 'arm in front' and states(document)[0] == 'rejected'
-    assert document.progress == (1, 4) and [frame.id for frame in read_session(folder).frames] == ['m1', 'm2', 'm3']
-    document.restore(0)
-    assert states(document)[0] == 'annotated' and len(read_session(folder).frames) == 4
-    with pytest.raises(ValueError, match='reason'):
-        document.reject(0, '  ')
-
-
 @settings(max_examples=25)
 @given(st.lists(st.tuples(st.sampled_from(['truth', 'reject', 'restore', 'person', 'undo', 'redo']),
                           st.integers(0, 3), st.integers(0, 1)), max_size=12))
@@ -150,12 +139,3 @@ def test_boxes_are_replaced_and_deleted_with_their_truth(document, folder):
 
 def opened(folder):
     return Document.open(folder).measurements
-
-
-def test_drafts_are_kept_until_the_truth_is_entered(document):
-    document.set_draft(1, {'x': '12', 'z': ''})
-    document.set_draft(2, {'reason': 'blu'})
-    assert document.draft(1) == {'x': '12'} and document.draft(2) == {'reason': 'blu'} and document.draft(0) == {}
-    document.set_truth(1, 0.12, 2.0)
-    document.reject(2, 'blurred')
-    assert document.draft(1) == document.draft(2) == {}

@@ -25,8 +25,8 @@ def walking(time_s):
     return np.array([[time_s, 0.0]])
 
 
-def seen(times_s, visible=True, off_m=0.0):
-    return [Sighting(time_s, np.array([visible]), walking(time_s) + [0, off_m]) for time_s in times_s]
+def seen(times_s):
+    return [Sighting(time_s, np.array([True]), walking(time_s)) for time_s in times_s]
 
 
 TIMES_S = np.arange(0, 5, 0.1)
@@ -49,9 +49,3 @@ def test_marks_far_from_the_person_now_and_soon_are_false():
     assert score_costmaps(ahead, seen(TIMES_S), walking)['false_cells'] == 0
     assert score_costmaps(ahead, seen(TIMES_S), walking)['recall'] == 0
     assert score_costmaps(beside, seen(TIMES_S), walking)['false_cells'] == pytest.approx(0.5, abs=0.02)
-
-
-@pytest.mark.parametrize('sightings', [seen(TIMES_S, visible=False), seen(TIMES_S, off_m=0.6)])
-def test_people_who_are_not_visible_or_not_tracked_do_not_count(sightings):
-    result = score_costmaps([costmap(time_s) for time_s in TIMES_S], sightings, walking)
-    assert (result['recall'], result['people'], result['false_cells'], result['trail_p95_s']) == (None, 0, None, None)

@@ -1,14 +1,11 @@
 """Benchmark of navigation: its scenes and sensors, the pace of the simulated time, the map, and the summary of trials.
 """
-from collections import namedtuple
-
 import numpy as np
 import pytest
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
 from ros_3d_bb_lab.evaluation.navigation.navigation_scenes import DURATION_S, SCENES, scenario_of
-from ros_3d_bb_lab.evaluation.navigation.trial_result import CELL_M, Pace, VisiblePeople, occupancy, summary
+from ros_3d_bb_lab.evaluation.navigation.trial_result import CELL_M, Pace, occupancy, summary
 from ros_3d_bb_lab.simulation.scenario import Furniture, Room, scenario_from
 
 LEAD_NS = int(Pace.LEAD_S * NS)
@@ -59,11 +56,3 @@ def test_the_summary_of_trials():
     assert summary(trials) == {'runs': 2, 'collisions': 2, 'collisions_driving': 1, 'runs_with_collisions': 1,
                                'reached': 1, 'time_to_goal_s': 10.0, 'min_distance_m': -.1, 'stops': 1.5}
     assert summary(trials[1:])['time_to_goal_s'] is None
-
-
-def test_people_are_visible_in_the_newest_image_of_any_camera():
-    Track = namedtuple('Track', 'id status')
-    visible = VisiblePeople(cameras=2)
-    images = (VISIBLE, OUT_OF_VIEW), (OUT_OF_VIEW, VISIBLE), (OCCLUDED, VISIBLE), (VISIBLE, OCCLUDED)
-    shown = [[track.id for track in visible.of([Track(1, one), Track(2, other)])] for one, other in images]
-    assert shown == [[1], [1, 2], [2], [1, 2]]

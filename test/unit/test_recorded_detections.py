@@ -5,15 +5,11 @@ import sys
 import numpy as np
 import pytest
 
-from ros_3d_bb.estimation.error_model import write_error_model
 from ros_3d_bb.tracking.types import OUT_OF_VIEW, VISIBLE, TrackedObject
 from ros_3d_bb_lab.evaluation.tracking import benchmark
-from ros_3d_bb_lab.evaluation.tracking.detection_generator import FALSE
-from ros_3d_bb_lab.evaluation.tracking.rates_benchmark import with_sources
 from ros_3d_bb_lab.evaluation.tracking.recorded_detections import START_NS, read_recordings
 from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S
-from support.error_models import MODEL
-from support.recordings import CAMERA_MPS, IMAGES, SPEED_MPS, write_recording
+from support.recordings import IMAGES, SPEED_MPS, write_recording
 
 
 def track(place_m):
@@ -35,24 +31,6 @@ def test_detections_and_truth_are_in_the_fixed_frame(tmp_path):
         future_m = image.truth.future_m[0]
         assert np.isfinite(future_m).all(axis=1).tolist() == known.tolist()
         assert np.allclose(future_m[known, 0], place_m[0] + SPEED_MPS * HORIZONS_S[known])
-
-
-def test_without_odometry_everything_moves_towards_the_camera(tmp_path):
-    run, = read_recordings(str(write_recording(tmp_path / 'one')), with_odometry=False)
-    last = run.images[-11]
-    time_s = (IMAGES - 11) / 10.0
-    assert np.allclose(last.view.fixed_from_camera, run.images[0].view.fixed_from_camera)
-    place_m = 8 + (SPEED_MPS - CAMERA_MPS) * time_s
-    assert np.allclose(last.detections[0].position_m, (place_m, 0, 1))
-    assert np.allclose(last.truth.position_m[0], (place_m, 0))
-    assert np.allclose(last.truth.velocity_mps[0], (SPEED_MPS - CAMERA_MPS, 0), atol=1e-6)
-    assert np.allclose(last.truth.future_m[0, 1], (place_m + SPEED_MPS - CAMERA_MPS, 0))
-
-
-@pytest.mark.parametrize('score,probability', [('3.32', 0.5), ('0.7', 0.7)])
-def test_scores_are_probabilities_or_those_of_pointrcnn(tmp_path, score, probability):
-    run, = read_recordings(str(write_recording(tmp_path / 'one', score)))
-    assert run.images[0].detections[0].score == pytest.approx(probability)
 
 
 @pytest.mark.parametrize('place_m,ignored,is_scored', [
@@ -91,16 +69,6 @@ def test_the_command_scores_recorded_detections(monkeypatch, tmp_path, capsys):
     assert 'coverage_95 0-8 m, 2s' in capsys.readouterr().out
 
 
-def test_boxes_show_the_nearest_people_one_to_one(tmp_path):
-    run, = read_recordings(str(write_recording(tmp_path / 'one')))
-    image = run.images[0]
-    person, place_m = image.truth.ids[0], np.append(image.truth.position_m[0], 1.0)
-    box = image.detections[0]
-    boxes = [box._replace(position_m=place_m + (0, offset_m, 0)) for offset_m in (0.3, 0.1, 0.7)]
-    run = run._replace(images=(image._replace(detections=boxes), image._replace(detections=[])))
-    assert [image.sources for image in with_sources(run).images] == [[FALSE, person, FALSE], []]
-
-
 @pytest.mark.needs('trackeval')
 def test_the_command_compares_rates_with_perfect_association(monkeypatch, tmp_path, capsys):
     """Of one person, perfect association is not better than ours."""
@@ -119,17 +87,3 @@ def test_the_command_compares_rates_with_perfect_association(monkeypatch, tmp_pa
         assert scores['ours']['hota'] > 50 and scores['ours']['id_switches'] == 0
         assert scores['perfect_association'] == pytest.approx(scores['ours'], abs=1e-6)
     assert 'recorded_detections   10.0 Hz  perfect_association' in capsys.readouterr().out
-
-
-@pytest.mark.needs('norfair', 'trackeval')
-def test_the_command_uses_an_error_model(monkeypatch, tmp_path):
-    """The boxes are right; a model with a bias of 1 m moves them away from the person."""
-    write_recording(tmp_path / 'one')
-    write_error_model(tmp_path / 'model.yaml', MODEL._replace(
-        z_bias=(1.0,), measured_range=MODEL.measured_range._replace(z_min_m=1.5, x_z_min_m=1.5)))
-    path = tmp_path / 'scores.json'
-    monkeypatch.setattr(sys, 'argv', ['./run bench tracking', '--detections', str(tmp_path / 'one'), '--json',
-                                      str(path), '--error-model', str(tmp_path / 'model.yaml')])
-    benchmark.main()
-    scores = json.loads(path.read_text())
-    assert scores['error_model'] == str(tmp_path / 'model.yaml') and scores['trackers']['ours']['recall'] == 0

@@ -20,7 +20,3 @@ def test_beams_end_at_walls_furniture_and_people():
     assert beam(ranges_m, np.pi / 4) == pytest.approx(1.5 * 2 ** .5)
     assert scan_ranges((0.0, 0.0, 0.0), ROOM, [[-2.0, 0.0]], [0.25])[AHEAD] == pytest.approx(5.0)
     assert scan_ranges((0.0, 0.0, np.pi), ROOM, [], [])[AHEAD] == pytest.approx(3.0)
-
-
-def test_walls_out_of_range_give_no_return():
-    assert scan_ranges((0.0, 0.0, 0.0), ROOM._replace(bounds=(-3.0, 12.0, -4.0, 4.0)), [], [])[AHEAD] == np.inf

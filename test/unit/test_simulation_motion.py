@@ -39,28 +39,6 @@ def test_velocity_is_the_derivative_of_position(start, person_moves, time_s):
     np.testing.assert_allclose((after.position_m - before.position_m) / (2 * TINY_S), state.velocity_mps, atol=1e-3)
 
 
-@given(points, moves)
-@settings(max_examples=50)
-def test_people_stay_at_the_end_of_their_last_move(start, person_moves):
-    motion = walker(*person_moves, start=start)
-    end = ([start] + [move.to for move in person_moves if move.to])[-1]
-    for time_s in (150, 1000):
-        state = motion.at(time_s)
-        np.testing.assert_allclose(state.position_m, end, atol=1e-9)
-        assert speed_of(state) < 1e-9 and state.posture.swing < 1e-9
-
-
-def test_repeated_moves_are_periodic():
-    person_moves = Move(to=(2, 0), speed=1.0), Move(wait=1.0, crouch=.5), Move(to=(0, 0), speed=.5)
-    motion = walker(*person_moves, repeat=True)
-    for time_s in np.arange(1, 50, 1.7):
-        now, later = motion.at(time_s), motion.at(time_s + 7)
-        np.testing.assert_allclose(later.position_m, now.position_m, atol=1e-9)
-        np.testing.assert_allclose(later.velocity_mps, now.velocity_mps, atol=1e-9)
-        assert later.posture[1:] == pytest.approx(now.posture[1:], abs=1e-9)
-    assert speed_of(motion.at(LONG_S)) > 0 or speed_of(motion.at(LONG_S - 1)) > 0
-
-
 def test_a_following_robot_faces_the_person_and_keeps_its_distance():
     person = walker(Move(to=(8.0, 0.0), speed=.8), Move(to=(8.0, 6.0), speed=.8), start=(2.0, 0.0))
     robot = Robot((-1.0, -1.0, 3.0), follow=Follow(1, distance=2.0, speed=1.2, rate=1.0))

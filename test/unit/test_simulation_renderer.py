@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb_lab.simulation.body import Body, Build
-from ros_3d_bb_lab.simulation.mesh import Mesh, box
+from ros_3d_bb_lab.simulation.mesh import box
 from ros_3d_bb_lab.simulation.renderer import render
 from ros_3d_bb_lab.simulation.room import FLOOR, RenderedRoom
 
@@ -97,18 +97,6 @@ def test_depth_of_a_box_is_that_of_rays(room, camera, x, y, yaw, size):
     for number in range(3):
         on_side = everywhere(hit & (axis == number))
         np.testing.assert_allclose(drawn.inverse_depth[on_side], 1 / near[on_side], rtol=1e-4)
-
-
-@pytest.mark.parametrize('order', [(0, 1), (1, 0)])
-def test_the_nearer_part_of_an_object_hides_the_farther_one(room, order):
-    parts = [crate((.2, .6, 1.0), (2, .2, 0)), crate((.4, 1.2, 2.0), (4, 0, 0), .5, (40, 200, 40))]
-    first, second = (parts[number] for number in order)
-    whole = Mesh(*[np.concatenate(columns) for columns in zip(first, second._replace(
-        faces=second.faces + len(first.vertices)))])
-    one, two = draw(room, [whole]), draw(room, parts)
-    np.testing.assert_array_equal(one.objects > 0, two.objects > 0)
-    assert np.mean(np.abs(one.inverse_depth - two.inverse_depth) > 1e-4) < .01
-    assert np.mean(one.color != two.color) < .01
 
 
 def test_objects_identify_the_object_of_each_pixel(room, person):

@@ -3,9 +3,8 @@ import numpy as np
 import pytest
 
 from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE
-from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel, half_width, shown, thesis_bias_m
-from ros_3d_bb_lab.evaluation.tracking.detection_generator import DetectablePerson, Detector
+from ros_3d_bb.tracking.types import VISIBLE
+from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel, half_width, shown
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING, STANDING, OdometryModel
 from ros_3d_bb_lab.evaluation.tracking.run_generator import Models, Timing, simulate
 from ros_3d_bb_lab.evaluation.tracking.trajectories import made_sequences
@@ -72,19 +71,6 @@ def test_without_errors_whole_boxes_are_the_truth(exact):
     assert whole > 100 and truncated > 5
 
 
-def test_occluded_people_are_behind_others_and_not_detected(exact):
-    occluded = 0
-    for image in exact.images:
-        bearing, range_m = polar(image)
-        for row in np.flatnonzero(image.truth.status == OCCLUDED):
-            reach = half_width(range_m) + half_width(range_m[row])
-            nearer = (range_m < range_m[row]) & (np.abs(bearing - bearing[row]) < reach)
-            occluded += 1
-            assert nearer.any() or np.abs(bearing[row]) + half_width(range_m[row]) > HALF_VIEW
-            assert image.truth.ids[row] not in image.sources
-    assert occluded > 5
-
-
 def test_only_people_in_view_are_visible_or_detected(exact):
     for image in exact.images:
         bearing, range_m = polar(image)
@@ -93,29 +79,3 @@ def test_only_people_in_view_are_visible_or_detected(exact):
         assert (range_m[visible] * np.cos(bearing[visible]) > 0.3).all()
         found = np.isin(image.truth.ids, image.sources)
         assert (np.abs(bearing[found]) < HALF_VIEW + half_width(range_m[found])).all() and (range_m[found] < 6.2).all()
-
-
-@pytest.fixture(scope='module')
-def boxes():
-    """Detections in 20000 images of a person 3 m straight ahead."""
-    detector, boxes = Detector(CameraModel(), 1, 1 / 30.0, np.random.RandomState(0)), []
-    seen, pose = [DetectablePerson(0, 3.0, 3.0, 0.0, 1.0, False, 0.0, 0.0)], np.zeros(3)
-    for number in range(20000):
-        detector.advance(pose)
-        boxes.append(detector.find(seen, pose, number / 30.0))
-    return boxes
-
-
-@pytest.mark.slow
-def test_depth_errors_are_those_of_the_model_with_outliers_behind(boxes):
-    camera = CameraModel()
-    detected = [box for found in boxes for box in found if box.source == 0]
-    errors_m = np.array([box.depth_m - 3 - 0.2 * thesis_bias_m(3) for box in detected])
-    usual_m = errors_m[errors_m < 0.15]
-    assert np.mean(errors_m > 0.2) == pytest.approx(0.05, abs=0.015) and errors_m.min() > -0.25
-    assert usual_m.std() == pytest.approx(np.sqrt(camera.covariance_m2(0.0, 3.0)[2, 2]), rel=0.08)
-    assert abs(usual_m.mean()) < 0.01
-    sides_m = np.array([3 * box.bearing for box in detected])
-    assert sides_m.std() == pytest.approx(np.sqrt(camera.covariance_m2(0.0, 3.0)[0, 0]), rel=0.1)
-    near_m = np.array([box.depth_m for box in detected if box.depth_m < 3.1])
-    assert 0.4 < np.corrcoef(near_m[:-1], near_m[1:])[0, 1] < 0.8  # half a second for one part, none for the other
