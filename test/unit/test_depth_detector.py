@@ -181,6 +181,12 @@ def test_the_last_floor_is_used_if_none_is_visible():
     assert DepthPeople().detect(color, hidden, CAMERA) is None
 
 
+def test_without_hog_the_error_names_what_to_install(monkeypatch):
+    monkeypatch.delattr(cv2, 'HOGDescriptor')
+    with pytest.raises(ValueError, match='HOGDescriptor.*python3-opencv'):
+        DepthPeople()
+
+
 @pytest.mark.slow
 def test_detects_the_people_of_a_session_with_few_false_positives(session_folder):
     """On real frames at least 97 % of the people whose body is in view at 1.4 m or more are detected, with at most 2
