@@ -24,13 +24,10 @@ def test_a_missing_image_is_named_and_other_measurements_can_be_annotated(folder
 
 
 @pytest.mark.parametrize('break_it,problem', [
-    (lambda entry: entry.pop('depth'), "'depth' is missing"), (lambda entry: entry.pop('id'), "'id' is missing"),
+    (lambda entry: entry.pop('id'), "'id' is missing"), (lambda entry: entry.update(person=2), 'person is 2'),
     (lambda entry: entry['detections'][0].update(box=[1, 2, 3]), '[1, 2, 3]'),
-    (lambda entry: entry.update(person=2), 'person is 2'),
-    (lambda entry: entry.update(person='me'), 'me'), (lambda entry: entry.update(truth_mm={'x': 1}), "'z' is missing"),
     (lambda entry: entry.update(truth_mm={'x': 1, 'z': 'far'}), 'far'),
-    (lambda entry: entry.update(stamp='yesterday'), 'stamp is'), (lambda entry: entry.update(color=7), 'int'),
-    (lambda entry: entry.update(detections=5), 'int'), (lambda entry: entry.update(detections=[[]]), 'list')])
+    (lambda entry: entry.update(stamp='yesterday'), 'stamp is'), (lambda entry: entry.update(detections=5), 'int')])
 def test_an_invalid_entry_is_shown_with_its_fault(folder, break_it, problem):
     change_json(folder, lambda content: break_it(content['frames'][1]))
     document = Document.open(folder)
@@ -45,8 +42,6 @@ def test_an_invalid_entry_is_shown_with_its_fault(folder, break_it, problem):
 
 @pytest.mark.parametrize('edit', [
     lambda content: content.pop('frames'), lambda content: content.update(frames=3),
-    lambda content: content.update(grid=[{'x': 1}]),
-    lambda content: content.update(grid=[{'name': 1, 'x': 'a', 'z': 1}]),
     lambda content: content.update(grid=[{'name': 'A', 'x': float('nan'), 'z': 1}])])
 def test_faults_of_the_whole_session_are_rejected(folder, edit):
     change_json(folder, edit)

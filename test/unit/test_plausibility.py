@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from ros_3d_bb.sessions.plausibility import FACTORS, LEAST_MEASUREMENTS, likely_errors
+from ros_3d_bb.sessions.plausibility import FACTORS, likely_errors
 from ros_3d_bb_lab.evaluation.noise.analysis import Inputs, analyse
 from ros_3d_bb_lab.evaluation.noise.tables import read_session_measurements
 
@@ -89,14 +89,6 @@ def made(count, seed=0, noise_m=0.01):
     truth_m = np.stack((random.uniform(-1, 1, count), random.uniform(1, 4, count)), axis=1)
     error_m = np.stack((-0.1 * truth_m[:, 0], 0.1 - 0.05 * truth_m[:, 1]), axis=1)
     return truth_m + error_m + noise_m * random.normal(size=truth_m.shape), truth_m
-
-
-def test_with_few_measurements_the_limit_is_0_3_m_or_15_percent():
-    likely = likely_errors(*made(LEAST_MEASUREMENTS - 1))
-    near_m, far_m = np.array([0.0, 1.0]), np.array([0.0, 4.0])
-    for measured_m, limit_m in ((near_m, 0.3), (far_m, 0.6)):
-        assert likely.are_plausible(measured_m, measured_m + (0, limit_m - 0.01))
-        assert not likely.are_plausible(measured_m, measured_m + (limit_m + 0.01, 0))
 
 
 @pytest.mark.parametrize('factors', [(1, 0.001), (0.001, 0.001), (1, 10), (0.01, 1), (-1, 1)])

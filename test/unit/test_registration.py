@@ -75,14 +75,6 @@ def test_a_rotated_distorted_depth_camera_sees_the_same_points():
     assert np.abs(part - expected_m)[part > 0].max() < 0.02  # the slope of the wall within a pixel
 
 
-def test_the_area_with_depth_is_that_of_the_depth_camera():
-    narrow = Camera(160, 120, 160.0, 160.0, 79.5, 59.5)
-    assert registered(stripe(), COLOR, 0.0).measured_area() == (0, 0, 640, 480)
-    left, top, right, bottom = registered(stripe(), COLOR, 0.0, narrow).measured_area()
-    assert (left, right) == pytest.approx((319.2 - 614.7 * 79.5 / 160, 319.2 + 614.7 * 79.5 / 160), abs=2)
-    assert (top, bottom) == pytest.approx((242.1 - 614.8 * 59.5 / 160, 242.1 + 614.8 * 59.5 / 160), abs=2)
-
-
 @pytest.mark.parametrize('baseline_m', [0.015, 0.05])
 def test_boxes_have_the_position_of_aligned_depth(baseline_m):
     view = mounted(1.0)

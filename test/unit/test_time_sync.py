@@ -2,7 +2,7 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.core.time_sync import NS, MessageCache, StampSynchronizer
+from ros_3d_bb.core.time_sync import NS, StampSynchronizer
 
 MS = NS // 1000
 PERIOD = 33 * MS
@@ -170,16 +170,6 @@ def test_all_boxes_are_matched_or_lost_for_any_messages(events):
     assert len(ended) == sent and len(set(ended)) == sent
     recorder.sync.end()
     assert len(recorder.frames) + len(recorder.dropped) == sent
-
-
-@given(st.lists(st.integers(0, 5 * NS), min_size=1, max_size=50))
-def test_the_cache_is_ordered_and_not_longer_than_its_length(stamps):
-    cache = MessageCache(NS)
-    for stamp_ns in stamps:
-        newest_ns = cache.newest_ns
-        assert cache.add(stamp_ns, 0, stamp_ns) == (newest_ns is not None and stamp_ns < newest_ns)
-        kept = [entry.stamp_ns for entry in cache._entries]
-        assert kept == sorted(kept) and kept[-1] - kept[0] <= NS and cache.nearest(stamp_ns).value == stamp_ns
 
 
 def held_by(sync):
