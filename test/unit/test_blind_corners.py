@@ -50,11 +50,6 @@ def test_invalid_ranges_are_ignored(invalid):
     assert corners_from(2.0, changed=changed) == pytest.approx(corners_from(2.0), abs=2 * HALF_BEAM_M)
 
 
-def test_a_scan_of_nothing_has_no_corners():
-    for ranges_m in ([], [np.inf] * 10, [np.nan] * 10, [1.0]):
-        assert blind_corners(ranges_m, (0.1, RANGE_M), 0.0, STEP).shape == (0, 3)
-
-
 def speed_at(x, corners_m, params=CORNERS, velocity=AHEAD):
     return speed_before_corners(np.reshape(corners_m, (-1, 2)) - [x, 0.0], 0.0, velocity, SAFETY, params)
 

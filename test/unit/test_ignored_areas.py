@@ -82,12 +82,6 @@ def test_cells_are_found_in_maps_of_any_pose(yaw, x, y, column, row):
     assert occupied.at([center_m, beside_m, center_m - 10 * turn[:, 1]]).tolist() == [True, False, False]
 
 
-def test_only_places_behind_the_surface_are_ignored():
-    areas = IgnoredAreas(occupied=OccupiedCells(np.ones((1, 1), bool), 0.1, (2.0, -0.05, 0.0)), map_depth_m=0.3)
-    assert [areas.contains((x, 0.0), CAMERA_M) for x in (1.9, 2.05, 2.3, 2.5)] == [False, True, True, False]
-    assert not areas.contains((1.8, 0.0), (1.0, 0.0)) and areas.contains((1.8, 0.0), (3.0, 0.0))
-
-
 @given(st.floats(0, 2 * np.pi), st.floats(0.1, 3))
 def test_a_point_is_inside_a_regular_polygon_within_its_incircle(angle, radius_m):
     turns = np.arange(7) * 2 * np.pi / 7

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.tracking.association import position_cost, position_costs
+from ros_3d_bb.tracking.association import position_costs
 from ros_3d_bb.tracking.kalman_filter import outlier_model, predict, update
 from ros_3d_bb.tracking.tracker import TrackerParams
 from support.states import covariance_of, mean_of, state_of
@@ -23,14 +23,6 @@ def state(position=(0, 0), velocity=(0, 0), spread=0.3, speed_spread=0.8, xu=0.0
 def measured_at(x, y, sigma=0.1, ray=(1.0, 0.0)):
     """A measurement on a viewing ray, along x by default."""
     return SimpleNamespace(x=x, y=y, xx=sigma ** 2, xy=0.0, yy=sigma ** 2, ray_x=ray[0], ray_y=ray[1])
-
-
-@given(SECONDS, SECONDS)
-def test_two_steps_are_one(first_s, second_s):
-    start = state((1, 2), (0.5, -1))
-    once = predict(start, first_s + second_s, 0.08)
-    twice = predict(predict(start, first_s, 0.08), second_s, 0.08)
-    np.testing.assert_allclose(once, twice, rtol=1e-9, atol=1e-12)
 
 
 @given(SECONDS, st.integers(0, 1000))
@@ -93,10 +85,3 @@ def test_the_cost_of_a_position_is_that_of_a_density():
     x, y = (axis.ravel() for axis in np.meshgrid(np.arange(-3, 4, step_m), np.arange(-3, 3, step_m)))
     costs = position_costs(x, y, 0.05, 0.0, 0.05, 1.0, 0.0, OUTLIERS)
     assert np.exp(-costs).sum() * step_m ** 2 == pytest.approx(1, abs=0.01)
-
-
-def test_costs_of_arrays_are_those_of_numbers():
-    x, y, xx, yy = np.random.RandomState(3).uniform(0.5, 1, (4, 7))
-    each = [position_cost(*numbers, ray_x=0.6, ray_y=0.8, outliers=OUTLIERS)
-            for numbers in zip(x.tolist(), y.tolist(), xx.tolist(), [0.3] * 7, yy.tolist())]
-    np.testing.assert_allclose(position_costs(x, y, xx, 0.3, yy, 0.6, 0.8, OUTLIERS), each)

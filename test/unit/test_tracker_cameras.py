@@ -13,7 +13,7 @@ from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.occlusion import depths_towards
-from ros_3d_bb.tracking.out_of_sequence import LATEST_NS, MAX_WAIT_NS, MOST_KEPT, MOST_SKIPPED
+from ros_3d_bb.tracking.out_of_sequence import LATEST_NS, MOST_KEPT
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView, Detection
 from support.cylinders import mounted
@@ -190,18 +190,6 @@ def test_skipped_images_of_one_camera_do_not_keep_tracks_of_the_other():
     assert tracker.tracks() == []
 
 
-@pytest.mark.parametrize('is_any_tracked', [True, False])
-def test_the_memory_of_skipped_images_is_limited(is_any_tracked):
-    """Each skipped image is of another frame; those of the camera in front are tracked, or there are none."""
-    tracker = Tracker()
-    for number in range(2000):
-        tracker.skip(START_NS + number * PERIOD_NS, 'frame_%06d' % number)
-        if is_any_tracked:
-            tracker.update(START_NS + number * PERIOD_NS, [], FRONT)
-    assert len(tracker._buffer._skipped) <= (
-        30 * (LATEST_NS + MAX_WAIT_NS) // NS + 2 if is_any_tracked else MOST_SKIPPED)
-
-
 @pytest.mark.parametrize('rate_hz', [0.8, 1.5])
 def test_a_slow_camera_has_the_same_weight_beside_a_fast_one_as_alone(rate_hz):
     """Errors of its boxes are not correlated from image to image. Only the slow one has the person in view."""
@@ -282,50 +270,6 @@ def test_late_cameras_are_replayed_in_batches(monkeypatch, late_images):
     images.sort(key=lambda image: image[0] + lates[image[2].camera] * PERIOD_NS)
     play(Tracker(), images)
     assert len(steps) <= 3 * len(images)
-
-
-@pytest.mark.parametrize('pause_s', [0.1, 0.5, 3.0])
-def test_late_images_that_wait_are_replayed_before_a_pause(pause_s):
-    images = images_of(1.0, standing(IN_BOTH))
-    late, after = images[-25], (images[-1][0] + int(pause_s * NS), shown(FRONT, around(IN_BOTH)), FRONT)
-    in_order, one_late = Tracker(), Tracker()
-    play(in_order, images + [after])
-    play(one_late, images[:-25] + images[-24:] + [late, after])
-    for one, other in zip(in_order.tracks(), one_late.tracks()):
-        assert one.id == other.id
-        np.testing.assert_array_equal(one.covariance, other.covariance)
-
-
-@pytest.mark.slow
-@settings(max_examples=14)
-@given(st.integers(1, 14), st.booleans())
-def test_the_delay_of_one_camera_changes_no_number(delay, into_front):
-    """Its images come up to 0.45 s late, and show somebody earlier than what the other one has shown by then."""
-    def walk(time_s):
-        return around(0.6 - 0.5 * time_s if into_front else 0.1 + 0.5 * time_s)
-    images = [(number + (2 * delay if image[2] is LEFT else 0), image)
-              for number, image in enumerate(images_of(1.5, walk))]
-    published = play(Tracker(), [image for _turn, image in sorted(images, key=lambda pair: pair[0])])
-    assert all(ids(objects) == [1] for objects in published[45:])
-    assert set(number for objects in published for number in ids(objects)) == {1}
-
-
-@pytest.mark.slow
-@settings(max_examples=60)
-@given(st.lists(st.tuples(st.integers(0, 12), st.booleans(), st.lists(st.floats(-0.6, 1.4), max_size=3)), min_size=1,
-                max_size=25))
-def test_whatever_comes_in_whatever_order_numbers_are_given_once(given_images):
-    tracker, taken = Tracker(), set()
-    for steps, is_left, bearings in given_images:
-        stamp_ns, view = START_NS + steps * PERIOD_NS, (FRONT, LEFT)[is_left]
-        if (stamp_ns, is_left) in taken:
-            continue
-        taken.add((stamp_ns, is_left))
-        objects = tracker.update(stamp_ns, [found for bearing in bearings for found in shown(view, around(bearing))],
-                                 view)
-        assert ids(objects) == sorted(set(ids(objects)))
-        tracks = tracker._buffer.state.tracks
-        assert len(set(track.id for track in tracks)) == len(tracks)
 
 
 def test_stamps_that_hardly_advance_are_rejected_until_they_do():
