@@ -1,7 +1,6 @@
 """The accuracy benchmark: scores of known errors, and the bars on the real measurements."""
 import os
 
-import cv2
 import numpy as np
 import pytest
 
@@ -16,8 +15,6 @@ from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import Simulator
 from ros_3d_bb_lab.simulation.true_boxes import LEAST_SHOWN
-from support.error_models import MODEL
-from support.small_session import change_json, write_small_session
 
 REAL_WEIGHTS = pytest.mark.needs(*['torch'] * bool(DATA))
 SCENARIOS = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'scenarios')
@@ -36,20 +33,6 @@ def test_scores_are_those_of_the_errors():
     assert scores['repeatability_z_m'] == pytest.approx(0.02) and scores['repeatability_x_m'] == pytest.approx(0)
     assert scores['p95_plane_m'] == pytest.approx(np.hypot(0.1, 0.07))
     assert scores['missed'] == 0 and scores['coverage_95'] is None
-
-
-def test_other_people_are_considered_as_in_nodes(tmp_path):
-    near_px, far_px = (10, 4, 34, 44), (24, 6, 44, 42)  # the near person hides half of the far one
-    folder = write_small_session(str(tmp_path), 1)
-    depth_mm = np.full((48, 64), 4000, np.uint16)
-    for (x1, y1, x2, y2), z_mm in ((far_px, 3000), (near_px, 2000)):
-        depth_mm[y1:y2, x1:x2] = z_mm
-    cv2.imwrite(os.path.join(folder, 'depth', 'm0.png'), depth_mm)
-    change_json(folder, lambda content: content['frames'][0].update(
-        person=1, truth_mm={'x': 0, 'z': 3000}, detections=[{'box': list(near_px)}, {'box': list(far_px)}]))
-    session = read_session(folder)
-    found, = compare(session, boxes_of(session), estimator_named('foreground'), MODEL)[0]['per_frame']
-    assert found['ours_raw'][2] == pytest.approx(3.1, abs=0.05)
 
 
 @pytest.fixture(scope='module')

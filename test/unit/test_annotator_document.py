@@ -1,7 +1,6 @@
 """Annotation of a session: edits are saved immediately, can be undone, and keep changes by other programs."""
 import os
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -27,22 +26,6 @@ def test_a_new_session_is_read(document):
     assert document.grid == (Mark('A1', -0.5, 2.0),) and document.camera.width == 64
     assert document.color(0)[20, 20].tolist() == [200, 30, 30]
     assert document.depth(0).values[20, 20] == NEAR_MM and document.depth(0).scale_m == 0.001
-
-
-def test_errors_are_those_of_the_analysed_estimate_of_the_selected_person(document):
-    assert document.errors(0) is None
-    document.set_truth(0, -0.5, 2.1)
-    x_m, _y_m, z_m = document.estimated(0, NEAR_BOX).center_m  # not the recorded 2.0 m
-    assert z_m == pytest.approx(2.09)
-    assert document.errors(0) == pytest.approx((x_m + 0.5, z_m - 2.1, np.hypot(x_m + 0.5, z_m - 2.1)))
-    document.choose_person(0, 1)
-    assert document.errors(0) is None  # each person has a truth of its own
-    document.set_truth(0, 0.7, 3.0)
-    assert document.errors(0)[1] == pytest.approx(0.09, abs=0.01)
-    assert document.measurements[0].truths == {0: (-0.5, None, 2.1), 1: (0.7, None, 3.0)}
-    for number in (-1, 2):
-        with pytest.raises(ValueError, match='detection %d .*2 detections' % number):
-            document.choose_person(0, number)
 
 
 def test_truth_is_saved_immediately_and_read_by_benchmarks(document, folder):
@@ -124,18 +107,3 @@ def test_the_truth_belongs_to_the_nearest_box_unless_one_was_selected(document):
     document.choose_person(1, 1)
     document.set_truth(1, 0.72, 2.9)  # nobody else can be there
     assert document.measurements[1].truths == {1: (0.72, None, 2.9)}
-
-
-def test_boxes_are_replaced_and_deleted_with_their_truth(document, folder):
-    document.set_truth(0, -0.5, 2.1)
-    document.replace_box(0, (11, 5, 25, 44))
-    box = opened(folder)[0].detections[0]
-    assert box.box_px == (11, 5, 25, 44) and box.by_hand and opened(folder)[0].truth_m == (-0.5, None, 2.1)
-    document.delete_box(0)
-    assert [one.box_px for one in opened(folder)[0].detections] == [FAR_BOX] and opened(folder)[0].truths == {}
-    document.undo()
-    assert opened(folder)[0].truths == {0: (-0.5, None, 2.1)}
-
-
-def opened(folder):
-    return Document.open(folder).measurements

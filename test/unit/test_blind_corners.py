@@ -38,10 +38,6 @@ def test_walls_legs_and_narrow_poles_hide_no_people():
     assert not len(corners_from(0.0, furniture=(), people_m=[(2.0, 0.5), (1.0, -1.0)]))
 
 
-def test_an_obstacle_close_to_a_wall_hides_no_people():
-    assert not len(corners_from(0.0, furniture=[{'at': [4.0, 3.9], 'size': [1.0, 0.2, 2.0]}]))
-
-
 @pytest.mark.parametrize('invalid', [np.nan, -np.inf, 0.0])
 def test_invalid_ranges_are_ignored(invalid):
     def changed(ranges_m):

@@ -8,8 +8,8 @@ from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.object_classes import PERSON_CLASS
 from ros_3d_bb.estimation.box3d import ImageGeometry, truncated_edges
-from ros_3d_bb.estimation.box3d_estimator import (check_rect, estimate_boxes, estimate_median, estimator_named,
-                                                  sample_depth, sample_grid)
+from ros_3d_bb.estimation.box3d_estimator import (estimate_boxes, estimate_median, estimator_named, sample_depth,
+                                                  sample_grid)
 from ros_3d_bb.estimation.foreground import estimate_foreground
 from ros_3d_bb.sessions.session_reader import read_depth, read_session
 
@@ -47,14 +47,6 @@ def test_the_grid_is_centred_and_clipped_to_the_image(x1, y1, width, height, str
             if 0 <= u < 64 and 0 <= v < 48:
                 expected.append((u, v))
     assert [tuple(pixel) for pixel in samples.pixels.reshape(-1, 2).tolist()] == expected
-
-
-@pytest.mark.parametrize('rect', [(10, 10, 10, 20), (20, 10, 10, 20), (10, 20, 20, 10), (10 ** 9, 0, 2 * 10 ** 9, 9)])
-def test_rectangles_without_samples(rect):
-    assert sample_depth(flat(1000), rect, 7).valid.size == sample_grid(flat(1000), rect).valid.size == 0
-    if rect[0] < 64:
-        with pytest.raises(ValueError, match=r'box \(%d, %d, %d, %d\)' % rect):
-            check_rect(rect)
 
 
 @pytest.mark.parametrize('depth,scale_m,dtype', [(0, 0.001, np.uint16), (np.nan, 1, np.float32),
@@ -148,18 +140,6 @@ def test_depths_beyond_any_camera_are_ignored():
     box = foreground(depth, (5, 5, 60, 45))
     assert box.center_m[2] == pytest.approx(2.0 + PERSON_CLASS.axis) and box.support == 1
     assert foreground(flat(1e-5, 1.0, np.float32), (5, 5, 60, 45)) is None  # less than a millimetre
-
-
-@pytest.mark.parametrize('name', ['foreground', 'median'])
-def test_boxes_are_in_the_order_of_their_rectangles(name):
-    depth = flat(5000)
-    depth.values[10:40, 30:50] = 3000
-    depth.values[5:45, 10:34] = 2000
-    depth.values[:, 60:] = 0
-    rects = [(28, 10, 50, 40), (60, 0, 64, 40), (10, 5, 34, 45)]
-    far, none, near = estimate_boxes(depth, rects, CAMERA, estimator_named(name))
-    assert none is None and near.rect_px == rects[2] and far.rect_px == rects[0]
-    assert near.center_m[2] < 2.2 and far.center_m[2] > near.center_m[2] + 0.4
 
 
 @pytest.mark.parametrize('name,stride,complaint', [('mean', 20, "estimator is 'mean'"), ('median', 0, 'stride is 0')])

@@ -16,12 +16,6 @@ def test_project_is_the_inverse_of_deproject(pixels, depth_m):
     np.testing.assert_allclose(D435I.project(points), pixels, atol=1e-6)
 
 
-def test_deprojection_of_known_pixels():
-    """Thesis 3.4.1: x = (X - cx) / fx * z."""
-    points = D435I.deproject([(319.199, 242.08), (319.199 + 614.686, 242.08 - 614.842)], [2, 3])
-    np.testing.assert_allclose(points, [(0, 0, 2), (3, -3, 3)], atol=1e-12)
-
-
 @pytest.mark.parametrize('field,value', [('width', 0), ('height', -1), ('fx', 0), ('fy', float('nan')),
                                          ('fx', float('inf')), ('cx', float('nan'))])
 def test_unusable_intrinsics_are_rejected(field, value):

@@ -6,12 +6,9 @@ import pytest
 
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import LEVEL, plausible
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
-from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.types import CameraView, detections_from_boxes
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL
 from ros_3d_bb_lab.simulation.scenario import read_scenario, scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
@@ -200,17 +197,6 @@ def test_a_person_who_crouches_behind_a_chest(camera_m, start_m, facing, height_
     assert box.center_m[2] == pytest.approx(depths_m(simulator)[0], abs=0.3)
 
 
-@pytest.mark.parametrize('height_m', [0.27, 0.9])
-@pytest.mark.parametrize('crouch', [0, 0.7])
-def test_a_person_before_a_pillar_in_a_loose_box(height_m, crouch):
-    simulator = simulator_of([{'start': [3.0, 0.1], 'facing': 2.6, 'height': 1.75, 'crouch': crouch}], height_m,
-                             furniture=[{'at': [4.0, 0.1], 'size': [0.25, 0.3, 2.4]}], wall_m=5.0)
-    left, top, right, bottom = simulator.frame(0).people[0].box_px
-    more_px = (bottom - top) // 6
-    box, = level_boxes(simulator, [(left - more_px, top - more_px, right + more_px, bottom)])
-    assert box.center_m[2] == pytest.approx(depths_m(simulator)[0], abs=0.3)
-
-
 POSES = {'still': {}, 'left arm out': dict(lift_l=1.57), 'right arm out': dict(lift_r=1.57),
          'both out': dict(lift_l=1.57, lift_r=1.57), 'left arm up': dict(lift_l=2.9),
          'both up': dict(lift_l=2.9, lift_r=2.9), 'bent': dict(bend=0.7)}
@@ -244,15 +230,6 @@ def test_arms_and_bending_do_not_move_the_axis_or_change_the_height(ahead_m, hei
     assert np.abs(up_m).max() < 0.05
 
 
-@pytest.mark.parametrize('facing', [3.14, 2.2, 1.57])
-@pytest.mark.parametrize('ahead_m,height_m,tilt_deg', [(4.2, 0.9, 0), (3.4, 2.35, 28)])
-def test_a_person_who_carries_a_box(ahead_m, height_m, tilt_deg, facing):
-    parcel = {'label': 'parcel', 'start': [ahead_m + 0.35 * np.cos(facing), 0.2 + 0.35 * np.sin(facing)],
-              'facing': facing, 'size': [0.3, 0.4, 0.3], 'above': 0.9}
-    errors_m = posed_person({'reach': 0.9}, ahead_m, facing, height_m, tilt_deg, [parcel])
-    assert abs(errors_m[0]) < 0.08 and np.abs(errors_m[1:]).max() < (0.08 if tilt_deg else 0.13)
-
-
 def test_covariances_hold_for_any_support():
     """95 % ellipses of about 90 people in each third of support, in crowds to which it was not fitted."""
     model = read_error_model(SIMULATED_ERROR_MODEL)
@@ -269,22 +246,3 @@ def test_covariances_hold_for_any_support():
     third = np.digitize(supports, np.percentile(supports, [100 / 3, 200 / 3]))
     coverage = [np.mean(np.array(distances)[third == number] < CHI_SQUARE_95) for number in range(3)]
     assert all(0.88 <= share for share in coverage) and np.mean(coverage) < 0.99, coverage
-
-
-def test_a_person_cut_at_the_hips_is_one_track_of_one_height():
-    simulator = simulator_of([{'start': [1.6, 0.1], 'facing': 3.1, 'height': 1.75}], 1.5, -2, 3.4, 30.0)
-    tracker, random, heights_m, ids = Tracker(), np.random.RandomState(5), [], set()
-    for number in range(100):
-        frame = simulator.frame(number)
-        (left, top, right, bottom), = [person.box_px for person in frame.people]
-        assert bottom == 480
-        rect_px = left, top, right, bottom - random.randint(0, 9)
-        box, = estimate_boxes(DepthImage(frame.depth_mm, 0.001), [rect_px], simulator.camera,
-                              estimator_named('foreground'))
-        map_from_camera = frame.poses.map_from_camera
-        tracks = tracker.update(int(frame.time_s * NS), detections_from_boxes({0: box}, map_from_camera),
-                                CameraView(map_from_camera, simulator.camera))
-        ids |= {track.id for track in tracks}
-        heights_m += [track.size_m[2] for track in tracks]
-    assert len(ids) == 1 and len(heights_m) > 90
-    assert np.ptp(heights_m) < 0.1

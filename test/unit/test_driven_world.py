@@ -4,7 +4,7 @@ import pytest
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb_lab.simulation.driven_world import COMMAND_TIMEOUT_S, DrivenWorld
-from ros_3d_bb_lab.simulation.scenario import Drive, Furniture, Move, Person, Robot, Room, Scenario
+from ros_3d_bb_lab.simulation.scenario import Furniture, Move, Person, Room, Scenario
 from ros_3d_bb_lab.simulation.simulator import STEP_S, Simulator
 
 CAMERA = Camera(8, 6, 8, 8, 4, 3)
@@ -36,20 +36,6 @@ def test_the_robot_obeys_commands_and_stops_without_them():
     assert speeds_mps[int(COMMAND_TIMEOUT_S / STEP_S) - 5] == pytest.approx(.5)
     assert speeds_mps[-1] == 0 == speeds_mps[int((COMMAND_TIMEOUT_S + .3) / STEP_S)]
     assert stopping[-1].robot.position_m[0] == stopping[-100].robot.position_m[0] > 1.9
-
-
-def test_odometry_drifts_and_the_map_frame_does_not():
-    robot = Robot(pose=(1.0, 2.0, 0.3), drive=Drive(odometry_error=(.1, .0)))
-    simulator = simulator_of(robot=robot)
-    world = DrivenWorld(simulator)
-    start, end = (driven(world, until_s, from_s=from_s)[-1] for until_s, from_s in ((0.0, 0.0), (4.0, .01)))
-    np.testing.assert_allclose(start.map_from_odom, np.eye(4), atol=1e-12)
-    poses = simulator.poses(end)
-    map_from_base = poses.map_from_odom.dot(poses.odom_from_base)
-    np.testing.assert_allclose(map_from_base[:2, 3], end.robot.position_m)
-    driven_m = end.robot.position_m - (1, 2)
-    np.testing.assert_allclose(poses.odom_from_base[:2, 3] - (1, 2), 1.1 * driven_m)
-    np.testing.assert_allclose(world.odometry_velocity, (1.1, 0))
 
 
 def test_the_robot_stops_at_furniture_and_says_so_once():

@@ -6,14 +6,13 @@ from hypothesis import strategies as st
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.ignored_areas import IgnoredAreas, OccupiedCells, polygons_from
+from ros_3d_bb.tracking.ignored_areas import OccupiedCells, polygons_from
 from ros_3d_bb.tracking.measurement_model import NoiseParams
 from ros_3d_bb.tracking.track import PredictionParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
 from ros_3d_bb.tracking.types import CameraView, Detection
 
 SQUARE = '[[[3, -0.5], [4, -0.5], [4, 0.5], [3, 0.5]]]'
-CAMERA_M = np.zeros(2)
 VIEW = CameraView(transform_from((0, 0, 1), OPTICAL_ROTATION), Camera(640, 480, 533.0, 533.0, 319.5, 239.5))
 
 
@@ -80,15 +79,6 @@ def test_cells_are_found_in_maps_of_any_pose(yaw, x, y, column, row):
     occupied = OccupiedCells(cells, 0.2, (x, y, yaw))
     beside_m = center_m + 0.21 * turn[:, 0]
     assert occupied.at([center_m, beside_m, center_m - 10 * turn[:, 1]]).tolist() == [True, False, False]
-
-
-@given(st.floats(0, 2 * np.pi), st.floats(0.1, 3))
-def test_a_point_is_inside_a_regular_polygon_within_its_incircle(angle, radius_m):
-    turns = np.arange(7) * 2 * np.pi / 7
-    areas = IgnoredAreas([np.column_stack((np.cos(turns), np.sin(turns))) * 2])
-    place_m = radius_m * np.array([np.cos(angle), np.sin(angle)])
-    if radius_m < 2 * np.cos(np.pi / 7) - 1e-6 or radius_m > 2 + 1e-6:
-        assert areas.contains(place_m, CAMERA_M) == (radius_m < 2)
 
 
 @pytest.mark.parametrize('text', ['[[1, 2]]', '[[[1, 2], [3, 4]]]', 'a', '[[[1, 2], [3, 4], [5, NaN]]]', '{}1', '3',

@@ -38,17 +38,6 @@ def test_the_prediction_is_that_of_the_textbook(elapsed_s, seed):
                                + 0.08 * np.kron(white, np.eye(2)), rtol=1e-9, atol=1e-12)
 
 
-@given(st.floats(-1, 1), st.floats(-1, 1), st.floats(0.02, 0.5))
-def test_without_outliers_it_is_the_textbook_filter(x, y, sigma):
-    start, matrix = state(xu=0.1), np.eye(2, 4)
-    covariance = covariance_of(start)
-    innovation = matrix.dot(covariance).dot(matrix.T) + sigma ** 2 * np.eye(2)
-    gain = covariance.dot(matrix.T).dot(np.linalg.inv(innovation))
-    after = update(start, measured_at(x, y, sigma), NONE)
-    np.testing.assert_allclose(mean_of(after), gain.dot([x, y]), atol=1e-9)
-    np.testing.assert_allclose(covariance_of(after), (np.eye(4) - gain.dot(matrix)).dot(covariance), atol=1e-9)
-
-
 @given(st.integers(0, 1000))
 def test_the_mixture_has_the_mean_and_the_covariance_of_both_updates(seed):
     random = np.random.RandomState(seed)

@@ -3,21 +3,13 @@ import json
 import sys
 
 import numpy as np
-import pytest
 
 from ros_3d_bb_lab.evaluation.tracking import motion_benchmark
-from ros_3d_bb_lab.evaluation.tracking.motion_benchmark import Clip, scores_of
+from ros_3d_bb_lab.evaluation.tracking.motion_benchmark import Clip
 
 TIMES_S = np.arange(0, 6, 0.02)
 WALK, STOP = (Clip(TIMES_S, np.column_stack((1.2 * walking_s, np.zeros(len(TIMES_S)))))
               for walking_s in (TIMES_S, np.minimum(TIMES_S, 2.5)))
-
-
-def test_people_who_stop_are_harder_to_predict():
-    walk, stop = (scores_of([clip], 10) for clip in (WALK, STOP))
-    for key in ('ours_fde_2s_m', 'plain_fde_2s_m', 'cv_fde_2s_m', 'nll_2s', 'plain_nll_2s'):
-        assert stop[key] > walk[key] + 0.3
-    assert stop['coverage_95_2s'] < 1
 
 
 def run_command(monkeypatch, *arguments):
@@ -37,10 +29,3 @@ def test_the_command_writes_scores_by_kind(monkeypatch, tmp_path):
     assert set(scores['rates']) == {'30', '15', '10', '5', '3'}
     assert scores['rates']['10']['true']['ours_fde_2s_m'] == scores['ours_fde_2s_m'] < 0.1
     assert scores['rates']['10']['noise_5cm']['ours_fde_2s_m'] > scores['ours_fde_2s_m']
-
-
-def test_unusable_data_is_named(monkeypatch, tmp_path):
-    (tmp_path / 'walking').mkdir()
-    (tmp_path / 'walking' / '1.csv').write_text('timestamp,x,y\n0,a,0')
-    with pytest.raises(ValueError, match='numbers in the columns'):
-        run_command(monkeypatch, '--data', str(tmp_path))

@@ -1,12 +1,11 @@
 """Benchmark of navigation: its scenes and sensors, the pace of the simulated time, the map, and the summary of trials.
 """
-import numpy as np
 import pytest
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb_lab.evaluation.navigation.navigation_scenes import DURATION_S, SCENES, scenario_of
-from ros_3d_bb_lab.evaluation.navigation.trial_result import CELL_M, Pace, occupancy, summary
-from ros_3d_bb_lab.simulation.scenario import Furniture, Room, scenario_from
+from ros_3d_bb_lab.evaluation.navigation.trial_result import Pace, summary
+from ros_3d_bb_lab.simulation.scenario import scenario_from
 
 LEAD_NS = int(Pace.LEAD_S * NS)
 
@@ -37,18 +36,6 @@ def test_time_waits_for_the_slowest_source():
     pace.heard('tracks', 6 * NS)
     assert pace.new_limit(100.2) == 6 * NS + LEAD_NS
     assert pace.late == 0
-
-
-def test_the_map_has_walls_and_furniture():
-    room = Room(bounds=(-1.0, 3.0, -2.0, 2.0), furniture=(Furniture((2.0, 1.0), (1.0, .5, 2.0)),))
-    cells = occupancy(room)
-    assert cells.shape == (4.0 / CELL_M, 4.0 / CELL_M) and set(np.unique(cells)) == {0, 100}
-
-    def at(x, y):
-        return cells[int((y + 2) / CELL_M), int((x + 1) / CELL_M)]
-
-    assert [at(*place) for place in ((2, 1), (1.6, .85), (1.4, 1), (2, .6), (0, 0), (-.99, 0), (0, 1.99))] == [
-        100, 100, 0, 0, 0, 100, 100]
 
 
 def test_the_summary_of_trials():

@@ -91,13 +91,6 @@ def test_without_an_invertible_bias_no_model_of_an_earlier_analysis_remains(out,
     assert 'no error_model.yaml is written' in page and 'The error model corrects' not in page
 
 
-def test_too_few_ranges_are_named(tmp_path, monkeypatch):
-    rows = [[x, x, z, z] for z in (1500, 2000) for x in (-500, 0, 500)]
-    table = write_table(tmp_path / 'table.csv', rows, COLUMNS[:4])
-    with pytest.raises(SystemExit, match='table.csv: .* 3 values of Z true needed; there are 3 at 1.5 m, 3 at 2 m'):
-        run(monkeypatch, '--z', table, '--x', table, '--out', tmp_path / 'out')
-
-
 def test_what_was_left_out_is_listed_and_does_not_prevent_the_analysis(tmp_path, monkeypatch, capsys):
     folder = write_synthetic_session(str(tmp_path / 'session'))
 

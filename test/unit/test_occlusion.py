@@ -73,11 +73,6 @@ def test_no_occlusion_between_opposite_sides_of_a_downward_camera():
     assert place(0.02, 0.9, view, others=[(-0.02, -0.4)]) == VISIBLE
 
 
-def test_a_view_without_intrinsics_includes_everything_ahead():
-    view = CameraView(LOOK)
-    assert place(3, 2.9, view) == VISIBLE and place(-1, 0, view) == OUT_OF_VIEW
-
-
 @pytest.mark.parametrize('others,expected', [
     ([(2, 0)], OCCLUDED), ([(4, 0)], VISIBLE), ([(2, 0.8)], VISIBLE), ([(2.9, 0)], VISIBLE), ([], VISIBLE)])
 def test_a_person_behind_another_one_is_occluded(others, expected):

@@ -171,15 +171,6 @@ def test_yaml_files_that_cannot_be_used_are_rejected(tmp_path, text, reason):
         OnnxModel(path, 1)
 
 
-def test_a_network_with_unknown_outputs_is_described(tmp_path):
-    path = write_constant_network(tmp_path / 'a.onnx', [np.zeros((1, 77, 79)), np.zeros((1, 4))])
-    with pytest.raises(WeightsError) as error:
-        OnnxModel(path, 1)
-    for part in (path, 'images [1, 3, 96, 128] tensor(float)', '[1, 77, 79]', '[1, 4]', 'yolov8 (1, 4 + classes, n)',
-                 'doc/onnx.md'):
-        assert part in str(error.value)
-
-
 @pytest.mark.parametrize('shape, element, reason', [
     ((1, 1, 96, 128), FLOAT, '1 channels'), ((4, 3, 96, 128), FLOAT, 'not one image'),
     ((1, 3, 96, 5000), FLOAT, '5000'), ((1, 3, 96, 128), 9, 'tensor')])

@@ -45,17 +45,6 @@ def test_false_tracks_count_where_the_recording_is_annotated(tmp_path, place_m, 
     assert run.in_scored_area(run.images[0], []).tolist() == []
 
 
-@pytest.mark.parametrize('name,content,message', [
-    ('camera.json', '{"width": 640}', 'camera.json: not a camera'),
-    ('truth.csv', 't_s,id\n', 'truth.csv has the columns t_s,id; t_s,id,x_m'),
-    ('detections.csv', 't_s,x_m,y_m,z_m,width_m,height_m,score\n0,1,2,x,1,1,1\n', 'detections.csv, line 2: 0,1,2,x')])
-def test_invalid_files_are_named(tmp_path, name, content, message):
-    folder = write_recording(tmp_path / 'one')
-    (folder / name).write_text(content)
-    with pytest.raises(ValueError, match=message):
-        list(read_recordings(str(folder)))
-
-
 @pytest.mark.needs('norfair', 'trackeval')
 def test_the_command_scores_recorded_detections(monkeypatch, tmp_path, capsys):
     write_recording(tmp_path / 'one')
@@ -67,23 +56,3 @@ def test_the_command_scores_recorded_detections(monkeypatch, tmp_path, capsys):
     assert scores['ours']['recall'] > 80 and scores['ours']['precision'] == 100
     assert set(scores['ours']['coverage_95_by_range']) == {'0-8', '8-16', '16-40'}
     assert 'coverage_95 0-8 m, 2s' in capsys.readouterr().out
-
-
-@pytest.mark.needs('trackeval')
-def test_the_command_compares_rates_with_perfect_association(monkeypatch, tmp_path, capsys):
-    """Of one person, perfect association is not better than ours."""
-    write_recording(tmp_path / 'one')
-    monkeypatch.delenv('ROS_3D_BB_DATA', raising=False)
-    monkeypatch.setattr(benchmark, 'PEDESTRIANS_EVERY', (10,))
-    monkeypatch.setattr(benchmark, 'RECORDINGS_EVERY', (1, 2))
-    path = tmp_path / 'scores.json'
-    monkeypatch.setattr(sys, 'argv', ['./run bench tracking', '--rates', '--seconds', '2', '--repetitions', '1',
-                                      '--detections', str(tmp_path / 'one'), '--json', str(path)])
-    benchmark.main()
-    result = json.loads(path.read_text())
-    assert list(result['pedestrians']) == ['3.0'] and list(result['recorded_detections']) == ['10.0', '5.0']
-    for scores in result['recorded_detections'].values():
-        assert set(scores) == {'ours', 'perfect_association'} and set(scores['ours']) == {'hota', 'idf1', 'id_switches'}
-        assert scores['ours']['hota'] > 50 and scores['ours']['id_switches'] == 0
-        assert scores['perfect_association'] == pytest.approx(scores['ours'], abs=1e-6)
-    assert 'recorded_detections   10.0 Hz  perfect_association' in capsys.readouterr().out

@@ -5,7 +5,6 @@ Without the weights of ROS_3D_BB_DATA, the true boxes replace those of YOLOv5.
 import glob
 import os
 
-import numpy as np
 import pytest
 
 from conftest import DATA
@@ -13,7 +12,7 @@ from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb_lab.evaluation.clear_mot import score
 from ros_3d_bb_lab.evaluation.scene_benchmark import (RANGE_M, depth_detector, detections_without_scores,
                                                       exact_detector, result_of, yolov5_detector)
-from ros_3d_bb_lab.evaluation.scenes import detect_in_scene, run_scene, score_detections
+from ros_3d_bb_lab.evaluation.scenes import run_scene, score_detections
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import Simulator
 
@@ -72,24 +71,6 @@ def test_recall_and_false_positives_of_detectors(runs, detector, recall, false_r
     assert people > 500
     assert found >= recall * people
     assert false <= false_rate * images
-
-
-@pytest.fixture
-def approach():
-    return Simulator(read_scenario(os.path.join(FOLDER, 'approach_jackal.yaml')))
-
-
-def test_exact_boxes_have_the_covariance_of_the_error_model(approach):
-    """In the map, whose x axis is the optical axis of the camera; the person is at 3.7 m, near the lower border."""
-    model = read_error_model(ERROR_MODEL)
-    _step, (before,), _view = next(detect_in_scene(approach, exact_detector(approach)))
-    step, (detection,), _view = next(detect_in_scene(approach, exact_detector(approach), error_model=model))
-    assert before.covariance_m2[2][2] == pytest.approx(0.1 ** 2)
-    camera_m = step.frame.poses.map_from_camera[:3, 3]
-    x_m, y_m, z_m = detection.position_m - camera_m
-    expected, = model.covariance(np.array([(-y_m, -z_m, x_m)]))
-    assert detection.covariance_m2[0][0] == pytest.approx(expected[2, 2] + 0.03 ** 2, rel=0.01)
-    assert detection.covariance_m2[2][2] == pytest.approx(expected[1, 1])
 
 
 @pytest.mark.slow

@@ -58,12 +58,6 @@ def test_the_score_decides_when_a_track_is_published(score, first):
     assert published == [0] * 30 if first is None else published == [0] * first + [1] * (30 - first)
 
 
-def test_boxes_with_low_scores_continue_a_track():
-    tracker = Tracker()
-    play(tracker, 1, standing_with(0.9))
-    assert [ids(objects) for objects in play(tracker, 1, standing_with(0.1), start_s=1)] == [[1]] * 30
-
-
 @pytest.mark.parametrize('rate_hz', [5, 60])
 def test_velocity_and_prediction_are_right_at_any_rate(rate_hz):
     walk = play(Tracker(), 4, lambda time_s: [at(4 - 0.4 * time_s, -1 + 0.6 * time_s)], rate_hz)
@@ -252,13 +246,6 @@ def test_new_parameters_apply_from_the_next_image_on_and_tracks_are_kept():
     tracker.reconfigure(TrackerParams(max_age=0.5), NoiseParams(), PredictionParams())
     assert play(tracker, 0.1, standing(), start_s=2)[-1] == []
     assert ids(play(tracker, 1, standing((3, 0)), start_s=3)[-1]) == [number + 1]
-
-
-def test_rejected_parameters_leave_all_the_old_ones():
-    tracker = Tracker()
-    with pytest.raises(ValueError, match='prediction_step'):
-        tracker.reconfigure(TrackerParams(), NoiseParams(), PredictionParams(prediction_time=1.0, prediction_step=0.0))
-    assert len(play(tracker, 1, standing((3, 0)))[-1][0].prediction_m) == 8
 
 
 @pytest.mark.slow

@@ -143,17 +143,6 @@ def test_two_people_side_by_side_in_both_views_are_two_tracks():
         assert np.linalg.norm(track.position_m[:2] - place_m) < 0.2
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize('bearing', [IN_FRONT, IN_BOTH, AT_LEFT])
-def test_a_missed_person_is_published_for_as_long_as_with_one_camera(bearing):
-    """For 0.35 s, for any number of cameras that have or do not have the person in view."""
-    tracker = Tracker()
-    play(tracker, images_of(1, standing(bearing)))
-    after = play(tracker, images_of(1, lambda _time_s: None, start_s=1.0))
-    states = [objects[0].status if objects else None for objects in after]
-    assert set(states[2:20]) == {OCCLUDED} and 19 <= len([state for state in states if state is not None]) <= 24
-
-
 def test_a_person_is_out_of_view_if_out_of_all_views():
     """The person walks out of the left view, past its outer border."""
     published = play(Tracker(), images_of(5, lambda time_s: around(0.9 + 0.4 * time_s)))

@@ -59,12 +59,6 @@ def test_the_label_is_the_most_probable_class_of_the_group():
     assert play(Tracker(), higher_score)[-1][0].label == 'cat'
 
 
-def test_unknown_scores_leave_the_score_as_it_is():
-    published = play(Tracker(), [[at(3, 0, score=0.0 if number % 2 else 0.8)] for number in range(20)])
-    assert published[-1][0].score == pytest.approx(0.8)
-    assert play(Tracker(), [[at(3, 0, score=0.6 if number > 15 else 0.0)] for number in range(20)])[-1][0].score == 0.6
-
-
 @pytest.mark.parametrize('kind', TRACKERS)
 def test_a_track_that_was_not_detected_has_no_detection(kind):
     tracker = kind()

@@ -39,17 +39,6 @@ def test_the_velocity_of_the_original_is_a_step_times_the_rate():
     assert person.prediction_m[-1, 0] == pytest.approx(1.1 + 2 * 2)
 
 
-def test_the_original_ages_tracks_only_if_they_are_more_than_the_boxes():
-    tracker = OriginalTracker()
-    tracker.update(stamp(1), at((1.0, 0.0), (3.0, 0.0)))
-    for number in range(2, 60):  # a new person gets the ID of one that left
-        people = tracker.update(stamp(number), at((1.0, 0.0), (9.0, 9.0)))
-        assert [person.id for person in people] == [1, 2]
-    for number in range(60, 89):
-        assert len(tracker.update(stamp(number), at((1.0, 0.0)))) == 2
-    assert [person.id for person in tracker.update(stamp(89), at((1.0, 0.0)))] == [1]
-
-
 @pytest.mark.needs('trackeval')
 def test_perfect_association_has_fewer_id_switches_and_false_positives():
     run = simulate(made_sequences(0, 20)[1], DRIVING, 0, seconds=2)
