@@ -11,13 +11,13 @@ from ros_3d_bb.estimation.box3d import plausible
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb_lab.evaluation.accuracy import Estimates, boxes_of, compare, scores_of
+from ros_3d_bb_lab.evaluation.defaults import scenario_path
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import Simulator
 from ros_3d_bb_lab.simulation.true_boxes import LEAST_SHOWN
 
 REAL_WEIGHTS = pytest.mark.needs(*['torch'] * bool(DATA))
-SCENARIOS = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'scenarios')
 PLACES = np.repeat([(0.0, 1.0), (0.5, 2.0), (-1.0, 3.0)], 4, axis=0)
 
 
@@ -79,7 +79,7 @@ def position_errors_m(simulator, estimator):
 @pytest.mark.parametrize('scene', ['behind_a_pillar', 'thesis_f_in_front'])
 def test_positions_are_accurate_despite_occlusion_and_background(scene):
     """In these scenes, the error of the thesis' median often exceeds 0.4 m."""
-    simulator = Simulator(read_scenario(os.path.join(SCENARIOS, scene + '.yaml')))
+    simulator = Simulator(read_scenario(scenario_path(scene)))
     ours, median = (position_errors_m(simulator, estimator_named(name)) for name in ('foreground', 'median'))
     assert len(ours) > 20 and not np.isnan(ours).any() and ours.max() < 0.4
     assert np.sqrt(np.mean(ours ** 2)) < 0.08

@@ -1,6 +1,4 @@
 """Positions where cameras are tilted, people overlap, or the image border truncates them, on simulated scenes."""
-import os
-
 import numpy as np
 import pytest
 
@@ -9,23 +7,21 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.estimation.box3d import LEVEL, plausible
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
-from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL
+from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_path
 from ros_3d_bb_lab.simulation.scenario import read_scenario, scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
 
-SCENARIOS = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'scenarios')
 SCATTER = 0.015  # standard deviation of the edges of detected boxes, relative to the box
 CHI_SQUARE_95 = 5.991  # 2 degrees of freedom
 
 pytestmark = pytest.mark.slow
 
 
-def simulator_of(people, height_m, tilt_deg=0, seconds=0.2, rate=5.0, seed=0, furniture=(), wall_m=14.0,
-                 objects=()):
+def simulator_of(people, height_m, tilt_deg=0, seconds=0.2, rate=5.0, seed=0, furniture=(), wall_m=14.0):
     robot = {'mount': [0.0, 0.0, height_m - 0.065], 'pitch': np.radians(tilt_deg)}
     room = {'bounds': [-4.0, wall_m, -7.0, 7.0], 'height': 4.0, 'furniture': list(furniture)}
     return Simulator(scenario_from({'duration': seconds, 'rate': rate, 'seed': seed, 'robot': robot, 'people': people,
-                                    'room': room, 'objects': list(objects)}))
+                                    'room': room}))
 
 
 def overlapping_people(count, nearest_m, farthest_m, random):
@@ -99,7 +95,7 @@ def depths_m(simulator):
 @pytest.mark.parametrize('nearest_mm', [500, 700])
 @pytest.mark.parametrize('name', ['high_mount', 'jackal', 'child', 'tall'])
 def test_a_person_too_near_for_the_depth_camera_is_not_the_wall(name, nearest_mm):
-    simulator = Simulator(read_scenario(os.path.join(SCENARIOS, 'approach_%s.yaml' % name)))
+    simulator = Simulator(read_scenario(scenario_path('approach_' + name)))
     too_near = 0
     for number in range(90, 180, 15):
         frame = simulator.frame(number)
@@ -202,11 +198,11 @@ POSES = {'still': {}, 'left arm out': dict(lift_l=1.57), 'right arm out': dict(l
          'both up': dict(lift_l=2.9, lift_r=2.9), 'bent': dict(bend=0.7)}
 
 
-def posed_person(angles, ahead_m, facing, height_m, tilt_deg, objects=()):
+def posed_person(angles, ahead_m, facing, height_m, tilt_deg):
     """Errors of the 3D box of a person in a posture, metres: sideways, of the height without arms, and of the height of
     the centre above the floor."""
     simulator = simulator_of([{'start': [ahead_m, 0.2], 'facing': facing, 'height': 1.7}], height_m, tilt_deg,
-                             objects=objects, wall_m=6.0)
+                             wall_m=6.0)
     state = simulator.state_at(0)
     person, = state.people
     posture = person.posture._replace(**angles)

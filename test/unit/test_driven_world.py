@@ -1,4 +1,4 @@
-"""World with a robot that obeys commands: motion, timeout, odometry, collisions, and people who give way."""
+"""World with a robot that obeys commands: motion, timeout, collisions, and people who give way."""
 import numpy as np
 import pytest
 

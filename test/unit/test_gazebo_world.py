@@ -1,4 +1,4 @@
-"""Scenarios as worlds of Gazebo, and true tracks from its model states, without Gazebo."""
+"""People of scenarios as actors of Gazebo, and true tracks from its model states, without Gazebo."""
 import xml.etree.ElementTree as ElementTree
 from types import SimpleNamespace
 

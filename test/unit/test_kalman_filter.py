@@ -1,4 +1,4 @@
-"""The filter's laws: it is a Kalman filter where nothing is an outlier, the same at any frame rate, and not fooled."""
+"""The filter's laws: predictions, the mixture of inliers and outliers, and costs."""
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,5 +1,4 @@
-"""Benchmark of navigation: its scenes and sensors, the pace of the simulated time, the map, and the summary of trials.
-"""
+"""Benchmark of navigation: its scenes, the pace of the simulated time, and the summary of trials."""
 import pytest
 
 from ros_3d_bb.core.time_sync import NS

@@ -182,11 +182,13 @@ def test_inputs_that_are_not_a_color_image_are_rejected(tmp_path, shape, element
 
 @pytest.mark.parametrize('metadata, reason', [
     ({'names': '3'}, 'names'), ({'stride': '0'}, 'stride'), ({'names': '[' * 100000}, 'a.onnx'),
-    ({'task': 'classify'}, 'classify')])
-def test_metadata_that_cannot_be_used_is_rejected(tmp_path, metadata, reason):
+    ({'names': "__import__('os').system('touch run')"}, 'names'), ({'task': 'classify'}, 'classify')])
+def test_metadata_that_cannot_be_used_is_rejected_and_not_executed(tmp_path, monkeypatch, metadata, reason):
+    monkeypatch.chdir(str(tmp_path))
     path = write_constant_network(tmp_path / 'a.onnx', outputs_of('yolov8', BOXES, SCORES, HW), metadata=metadata)
     with pytest.raises(WeightsError, match=reason):
         OnnxModel(path, 1)
+    assert not os.path.exists('run')
 
 
 @pytest.mark.parametrize('content', [b'\x3a\xff\x01abc', b'\xff' * 20, b'', b'nonsense'])

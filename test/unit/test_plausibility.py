@@ -1,4 +1,4 @@
-"""Plausibility of truth: slips are found, clean measurements are not questioned, and slips do not change the model."""
+"""Plausibility of truth: slips are found, and clean measurements are not questioned."""
 import numpy as np
 import pytest
 

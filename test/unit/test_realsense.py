@@ -1,4 +1,4 @@
-"""RealSense driver on recordings that librealsense records, aligns and plays; no camera is needed."""
+"""RealSense driver on recordings that librealsense records and plays; no camera is needed."""
 import sys
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Body model: feet on the floor, and the way it faces."""
+"""Body model: feet on the floor."""
 import numpy as np
 import pytest
 from hypothesis import given, settings

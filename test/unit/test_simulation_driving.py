@@ -1,4 +1,4 @@
-"""Differential drive and contact of the simulated robot: limits, arcs, and distances of rectangles."""
+"""Differential drive and contact of the simulated robot: limits, and distances of rectangles."""
 import numpy as np
 import pytest
 from hypothesis import given, settings

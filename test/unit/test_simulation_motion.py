@@ -1,4 +1,4 @@
-"""Motion of people and of the robot: agreement with the moves, and smoothness."""
+"""Smooth motion of people."""
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st

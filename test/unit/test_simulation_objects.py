@@ -1,4 +1,4 @@
-"""Objects other than people in the simulator: shapes, motion, ground truth, and errors of estimated positions."""
+"""Objects other than people in the simulator, and their ground truth."""
 import numpy as np
 import pytest
 

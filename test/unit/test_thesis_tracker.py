@@ -57,6 +57,17 @@ def test_an_undetected_object_is_deleted_after_the_limit_in_seconds(rate_hz):
     assert tracker.update(seconds(1 + 1 / rate_hz), []) == []
 
 
+def test_tracks_do_not_age_during_skipped_images():
+    """tf failed for 10 s: the images in between are skipped."""
+    tracker = ThesisTracker(ThesisTrackerParams(disappearance_limit=1.0))
+    tracker.update(0, [at(0, 0)])
+    for frame in range(1, 300):
+        tracker.skip(seconds(frame / 30))
+    assert [track.id for track in tracker.update(seconds(10), [])] == [1]
+    assert [track.id for track in tracker.update(seconds(10.5), [])] == [1]
+    assert tracker.update(seconds(11.1), []) == []
+
+
 @pytest.mark.parametrize('stamp_s', [1.0, 0.5])
 def test_a_late_or_duplicate_image_is_rejected_without_any_change(stamp_s):
     tracker = ThesisTracker()

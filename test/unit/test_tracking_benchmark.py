@@ -1,4 +1,4 @@
-"""The trackers of the benchmark, and the command."""
+"""The runs and trackers of the benchmark, and the command."""
 import json
 import sys
 
@@ -37,6 +37,16 @@ def test_the_velocity_of_the_original_is_a_step_times_the_rate():
     person, = tracker.update(stamp(1) + NS // 100, at((1.1, 0.0)))  # 10 ms later
     assert person.velocity_mps[0] == pytest.approx(0.2 * 10) and person.instant_velocity_mps[0] == pytest.approx(10)
     assert person.prediction_m[-1, 0] == pytest.approx(1.1 + 2 * 2)
+
+
+def test_the_same_seed_gives_the_same_run_and_another_one_another():
+    sequence = made_sequences(0, 30)[1]
+    first, again, other = (simulate(sequence, DRIVING, seed, seconds=1) for seed in ((3, 0), (3, 0), (3, 1)))
+    assert len(first.images) == len(again.images)
+    for image, same in zip(first.images, again.images):
+        assert image.stamp_ns == same.stamp_ns and image.sources == same.sources
+        assert all(np.array_equal(a.position_m, b.position_m) for a, b in zip(image.detections, same.detections))
+    assert first.images[0].stamp_ns != other.images[0].stamp_ns
 
 
 @pytest.mark.needs('trackeval')
