@@ -29,9 +29,9 @@ def test_a_new_session_is_read(document):
 
 
 def test_truth_is_saved_immediately_and_read_by_benchmarks(document, folder):
-    document.set_truth(1, 0.1, 2.3)
+    document.set_truths([1], 0.1, 2.3)
     document.choose_person(2, 1)
-    document.set_truth(2, 0.1, 2.3, -0.05)
+    document.set_truths([2], 0.1, 2.3, -0.05)
     entries = read_json(folder)['frames']
     assert entries[1]['truth_mm'] == {'x': 100, 'z': 2300} and entries[2]['truth_mm'] == {'x': 100, 'z': 2300, 'y': -50}
     frames = read_session(folder).frames
@@ -51,7 +51,7 @@ def test_after_any_edits_the_file_is_what_is_shown_and_undo_leads_back(tmp_path_
         if kind in ('undo', 'redo'):
             getattr(document, kind)()
         else:
-            {'truth': lambda: document.set_truth(index, number, 1 + number), 'reject': lambda: document.reject(
+            {'truth': lambda: document.set_truths([index], number, 1 + number), 'reject': lambda: document.reject(
                 index, 'no'), 'restore': lambda: document.restore(index),
              'person': lambda: document.choose_person(index, number)}[kind]()
     shown, saved = ([(one.truth_m, one.person, one.rejected) for one in source.measurements]
@@ -64,7 +64,7 @@ def test_after_any_edits_the_file_is_what_is_shown_and_undo_leads_back(tmp_path_
 
 def test_measurements_added_by_a_viewer_are_kept_and_shown(document, folder):
     change_json(folder, lambda content: content['frames'].append(write_measurement(folder, 'new')))
-    document.set_truth(0, 0.1, 2.0)
+    document.set_truths([0], 0.1, 2.0)
     assert [entry['id'] for entry in read_json(folder)['frames']] == ['m0', 'm1', 'm2', 'm3', 'new']
     assert document.measurements[4].id == 'new' and document.progress == (1, 5)
     assert not document.refresh()  # only its own edit
@@ -76,9 +76,9 @@ def test_measurements_added_by_a_viewer_are_kept_and_shown(document, folder):
 
 def test_two_annotators_keep_the_fields_of_each_other(document, folder):
     other = Document.open(folder)
-    document.set_truth(0, 0.1, 2.0)
+    document.set_truths([0], 0.1, 2.0)
     other.add_box(0, (1, 1, 30, 40))
-    other.set_truth(1, 0.3, 2.2)
+    other.set_truths([1], 0.3, 2.2)
     assert read_json(folder)['frames'][0]['truth_mm'] == {'x': 100, 'z': 2000}
     assert document.refresh() and len(document.measurements[0].detections) == 3
     assert states(document)[1] == 'annotated'
@@ -89,21 +89,21 @@ def test_two_annotators_keep_the_fields_of_each_other(document, folder):
 def test_an_edit_that_cannot_be_saved_raises_an_error_and_changes_nothing(document, folder):
     with open(os.path.join(folder, 'frames.json'), 'w') as stream:
         stream.write('{"frames"')
-    for edit in (lambda: document.set_truth(0, 0.1, 2.0), document.refresh):
+    for edit in (lambda: document.set_truths([0], 0.1, 2.0), document.refresh):
         with pytest.raises(SessionError, match='frames.json|cannot be saved'):
             edit()
     assert states(document) == ['new'] * 4 and not document.can_undo
     os.rename(folder, folder + '-gone')
     with pytest.raises(SessionError, match='cannot be saved'):
-        document.set_truth(0, 0.1, 2.0)
+        document.set_truths([0], 0.1, 2.0)
 
 
 def test_the_truth_belongs_to_the_nearest_box_unless_one_was_selected(document):
-    document.set_truth(0, 0.72, 2.9)
+    document.set_truths([0], 0.72, 2.9)
     assert document.measurements[0].person == 1 and document.errors(0)[2] < 0.25
     document.choose_person(1, 0)
-    document.set_truth(1, 0.72, 2.9)
+    document.set_truths([1], 0.72, 2.9)
     assert document.measurements[1].person == 0
     document.choose_person(1, 1)
-    document.set_truth(1, 0.72, 2.9)  # nobody else can be there
+    document.set_truths([1], 0.72, 2.9)  # nobody else can be there
     assert document.measurements[1].truths == {1: (0.72, None, 2.9)}

@@ -37,5 +37,5 @@ def test_truth_can_be_entered_for_a_box_that_cannot_be_estimated(document, folde
     change_json(folder, lambda content: content['frames'][0]['detections'][0].pop('estimate_mm'))
     document.refresh()
     break_it(document)
-    document.set_truth(0, 0.1, 2.0)
+    document.set_truths([0], 0.1, 2.0)
     assert document.measurements[0].truth_m == (0.1, None, 2.0) and document.errors(0) is None

@@ -37,7 +37,7 @@ def test_lost_data_are_reported_and_nothing_is_estimated(tmp_path):
 def test_truth_is_saved_in_another_file_and_the_text_is_unchanged(tmp_path):
     document = Document.open(write_old_session(str(tmp_path)))
     document.choose_person(1, 1)
-    document.set_truth(1, 0.0, 0.3)
+    document.set_truths([1], 0.0, 0.3)
     document.reject(0, 'blurred')
     assert (tmp_path / 'measurements.txt').read_text() == '\n'.join(LINES) + '\n'
     reopened = Document.open(str(tmp_path))

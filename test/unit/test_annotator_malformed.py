@@ -19,7 +19,7 @@ def test_a_missing_image_is_named_and_other_measurements_can_be_annotated(folder
         with pytest.raises(SessionError, match='m1.png: missing'):
             read(1)
     document.reject(1, 'no images')
-    document.set_truth(2, -0.5, 2.1)
+    document.set_truths([2], -0.5, 2.1)
     assert list(problems_of(document)) == []
 
 
@@ -33,10 +33,10 @@ def test_an_invalid_entry_is_shown_with_its_fault(folder, break_it, problem):
     document = Document.open(folder)
     assert problem in document.measurements[1].problem and document.measurements[1].state == 'new'
     assert problem in list(problems_of(document))[0]
-    for edit in (lambda: document.color(1), lambda: document.set_truth(1, 0.1, 2.0)):
+    for edit in (lambda: document.color(1), lambda: document.set_truths([1], 0.1, 2.0)):
         with pytest.raises(SessionError):
             edit()
-    document.set_truth(2, 0.1, 2.0)
+    document.set_truths([2], 0.1, 2.0)
     assert read_json(folder)['frames'][2]['truth_mm'] == {'x': 100, 'z': 2000}
 
 

@@ -14,12 +14,6 @@ OUTLIERS, NONE = outlier_model(TrackerParams()), outlier_model(TrackerParams(out
 SECONDS = st.floats(0.01, 2)
 
 
-def state(position=(0, 0), velocity=(0, 0), spread=0.3, speed_spread=0.8, xu=0.0):
-    covariance = np.diag([spread ** 2, spread ** 2, speed_spread ** 2, speed_spread ** 2])
-    covariance[0, 2] = covariance[2, 0] = xu
-    return state_of(tuple(position) + tuple(velocity), covariance)
-
-
 def measured_at(x, y, sigma=0.1, ray=(1.0, 0.0)):
     """A measurement on a viewing ray, along x by default."""
     return SimpleNamespace(x=x, y=y, xx=sigma ** 2, xy=0.0, yy=sigma ** 2, ray_x=ray[0], ray_y=ray[1])
@@ -57,15 +51,6 @@ def test_the_mixture_has_the_mean_and_the_covariance_of_both_updates(seed):
     after = update(state_of(mean, covariance), measured_at(*place_m, ray=ray), OUTLIERS)
     np.testing.assert_allclose(mean_of(after), mixed, rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(covariance_of(after), np.average(spreads, axis=0, weights=shares), rtol=1e-6, atol=1e-8)
-
-
-def test_a_measurement_behind_the_person_is_an_outlier():
-    """0.8 m behind is what a background pixel looks like; 0.8 m beside no background explains."""
-    sure = state(spread=0.1)
-    behind, beside = update(sure, measured_at(0.8, 0.0), OUTLIERS), update(sure, measured_at(0.0, 0.8), OUTLIERS)
-    plain = update(sure, measured_at(0.8, 0.0), NONE)
-    assert abs(behind.x) < 0.1 and plain.x == pytest.approx(0.4, abs=1e-4)
-    assert beside.y == pytest.approx(0.4, abs=1e-4)
 
 
 def test_the_cost_of_a_position_is_that_of_a_density():
