@@ -109,7 +109,7 @@ def test_the_box_of_a_person_extends_from_head_to_feet(height_m, x, z, camera, f
 
 
 @pytest.mark.parametrize('number', [100, 217, 246, 285])
-def test_the_box_of_a_person_whose_legs_are_behind_another_extends_to_the_floor(number):
+def test_the_box_of_a_person_with_hidden_legs_extends_to_the_floor(number):
     """In images of the demo, in which two people walk in front of the fourth one."""
     simulator = Simulator(read_scenario(scenario_path('demo')))
     frame = simulator.frame(number)

@@ -46,7 +46,7 @@ def test_covariance_is_the_spread_inside_and_grows_outside():
     assert (np.diag(near) > np.diag(MODEL.covariance([0, 0, 0.5]))).all()
 
 
-def test_only_positions_in_front_of_the_camera_are_corrected_and_stay_there():
+def test_only_positions_before_the_camera_are_corrected_and_stay_there():
     assert MODEL._replace(z_bias=(0.3,)).corrected([[0.0, 0.2, 0.1]])[0, 2] > 0
     with pytest.raises(ValueError, match='z is -1 m'):
         MODEL.corrected([[0, 0, 1], [0, 0, -1]])

@@ -39,7 +39,7 @@ def test_a_given_track_is_awaited():
     assert selected(selector, 3, person(1, 3, 0), person(2, 4, 0), track_id=2) == 2
 
 
-def test_a_person_who_is_not_visible_is_lost_after_a_second_and_followed_again_with_the_same_id():
+def test_a_hidden_person_is_lost_after_a_second_and_found_by_the_same_id():
     selector = TargetSelector()
     selected(selector, 1, person(1, 3, 0))
     assert selected(selector, 1.9, person(1, 3, 0, OCCLUDED), person(2, 2, 0)) == 1

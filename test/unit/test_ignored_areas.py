@@ -49,7 +49,7 @@ def test_a_new_area_ends_the_tracks_in_it_and_keeps_the_others():
     assert play(tracker, 4, 1, at(3.5, 0.2), at(3.5, 1.2)) == [[2]] * 10
 
 
-def test_a_poster_on_a_wall_of_the_map_is_no_person_and_a_person_before_the_wall_is_one():
+def test_of_a_poster_on_a_wall_and_a_person_before_it_one_is_a_person():
     wall = np.zeros((60, 60), bool)
     wall[:, 40] = True  # x from 4.0 to 4.1 of the map
     tracker = Tracker()

@@ -78,7 +78,7 @@ def test_the_error_models_can_be_read_and_correct_the_bias(out):
     assert scores.rmse_plane_m < 0.07 and 0.85 < scores.coverage_95 <= 1
 
 
-def test_without_an_invertible_bias_no_model_of_an_earlier_analysis_remains(out, tmp_path, monkeypatch, capsys):
+def test_without_an_invertible_bias_no_earlier_model_remains(out, tmp_path, monkeypatch, capsys):
     shutil.copy(str(out / 'error_model.yaml'), str(tmp_path))
     rows = [[x, x, 0.3 * z + 600 + 5 * number, z] for z in (1500, 2000, 3000, 4000) for x in (-500, 0, 500)
             for number in range(3)]

@@ -114,7 +114,7 @@ def test_without_predictions_positions_become_less_certain_by_the_velocity():
 
 
 @pytest.mark.parametrize('heading', [0.0, np.pi / 4, np.pi / 2])
-def test_what_is_marked_of_a_walking_person_out_of_view_does_not_depend_on_the_heading(heading):
+def test_marks_of_a_person_out_of_view_do_not_depend_on_the_heading(heading):
     turn = upright(0, 0, 0, heading)[:3, :3]
     covariance = np.zeros((6, 6))
     covariance[:3, :3] = turn.dot(np.diag([0.23 ** 2, 0.1 ** 2, 0.01])).dot(turn.T)

@@ -322,7 +322,7 @@ def test_a_jump_of_the_pose_gives_standing_people_no_velocity(jump_m, people, ra
     assert tracker.common_motions == 1
 
 
-def test_a_person_who_steps_aside_does_not_move_the_frame_of_a_robot_that_starts():
+def test_a_person_who_steps_aside_does_not_move_the_frame():
     """The robot starts with 2 m/s2; the person steps by 0.5 m."""
     tracker = Tracker()
     for frame in range(20):

@@ -102,7 +102,7 @@ def test_a_person_who_walks_up_to_a_low_camera_and_stops_stays_before_it(speed_m
     assert np.linalg.norm(track.velocity_mps) < 0.05 and 0.5 < track.prediction_m[-1, 0] <= 0.9
 
 
-def test_a_wall_behind_a_person_who_has_left_does_not_keep_the_track_for_ever():
+def test_a_wall_behind_a_person_who_has_left_does_not_keep_the_track():
     """The person stood 0.3 m before it. Afterwards the robot, which stands, sees only the wall."""
     tracker, wall = Tracker(), [low_camera(1.3)]
     play(tracker, images_of(1, lambda _time_s: (1.0, 0.0), wall))
