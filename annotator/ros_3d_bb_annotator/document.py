@@ -132,12 +132,11 @@ class Document(object):
         label = self.measurements[index].label.strip().casefold()
         return next((mark for mark in self.grid if label and mark.name.strip().casefold() == label), None)
 
-    def set_truth(self, index, x_m, z_m, y_m=None):
-        """Set the true position of the person, see `person_at`, and restore a rejected measurement."""
-        self.set_truths([index], x_m, z_m, y_m)
-
     def set_truths(self, indices, x_m, z_m, y_m=None):
-        """Set the same true position, in front of the camera, in several measurements, which is undone in one step."""
+        """Set the same true position, see `person_at`, in several measurements, which is undone in one step.
+
+        It is in front of the camera. Rejected measurements are restored.
+        """
         values_m = [value for value in (x_m, y_m, z_m) if value is not None]
         if not np.isfinite(values_m).all() or max(np.abs(values_m)) > FARTHEST_M:
             raise ValueError('truth %s is not a position within %g m' % (values_m, FARTHEST_M))

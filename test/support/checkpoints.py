@@ -10,7 +10,7 @@ import torch
 from ros_3d_bb.detection.yolov5.network import Bottleneck, C3, Concat, Conv, Detect, Focus, Network, SPP, SPPF
 
 
-def write_checkpoint(path, layout, yaml=None, root='Model', anchor_grid=False, **extra):
+def write_checkpoint(path, layout, yaml=None, root='Model', anchor_grid=False):
     """Write a checkpoint of random float16 weights and return its network.
 
     Parameters
@@ -21,8 +21,6 @@ def write_checkpoint(path, layout, yaml=None, root='Model', anchor_grid=False, *
         Name of the model's class in `models.yolo`: Model (to release 6.1), DetectionModel (6.2 on), or another.
     anchor_grid : bool
         Whether the anchors are stored twice, as in release 5.0.
-    **extra
-        Other entries of the checkpoint, beside `model`.
     """
     network = random_network(layout).half()
     if anchor_grid:
@@ -32,7 +30,7 @@ def write_checkpoint(path, layout, yaml=None, root='Model', anchor_grid=False, *
             module.__class__ = classes.get(type(module), type(module))
         network.yaml = yaml or layout
         network.names = ['person'] + ['thing %d' % number for number in range(1, layout['nc'])]
-        torch.save(dict({'epoch': -1, 'model': network, 'ema': None, 'optimizer': None}, **extra), path)
+        torch.save({'epoch': -1, 'model': network, 'ema': None, 'optimizer': None}, path)
         ours = {official: own for own, official in classes.items()}
         for module in network.modules():
             module.__class__ = ours.get(type(module), type(module))

@@ -60,7 +60,7 @@ def distributions(distances, bins):
     return np.log(np.clip(1 - np.abs(offsets), 1e-9, 1)).reshape(len(distances), 4 * bins)
 
 
-def write_mean_network(path, input_shape=(1, 3, 96, 128), element=FLOAT, channels_last=False, metadata=()):
+def write_mean_network(path, input_shape=(1, 3, 96, 128), element=FLOAT, channels_last=False):
     """Write a network whose only detection (1, 1, 6) is the mean of the channels of its input, twice. Returns the path.
 
     The mean of the second channel is the score, and that of the third one the class.
@@ -71,5 +71,5 @@ def write_mean_network(path, input_shape=(1, 3, 96, 128), element=FLOAT, channel
     row = graph.node('Reshape', [graph.node('Concat', [mean, mean], axis=1),
                                  graph.constant(np.array([1, 1, 6], np.int64))])
     with open(str(path), 'wb') as stream:
-        stream.write(graph.model([('images', element, tuple(input_shape))], [(row, FLOAT, (1, 1, 6))], dict(metadata)))
+        stream.write(graph.model([('images', element, tuple(input_shape))], [(row, FLOAT, (1, 1, 6))], {}))
     return str(path)

@@ -1,7 +1,6 @@
 """Annotation of a session: edits are saved immediately, can be undone, and keep changes by other programs."""
 import os
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -29,26 +28,10 @@ def test_a_new_session_is_read(document):
     assert document.depth(0).values[20, 20] == NEAR_MM and document.depth(0).scale_m == 0.001
 
 
-def test_errors_are_those_of_the_analysed_estimate_of_the_selected_person(document):
-    assert document.errors(0) is None
-    document.set_truth(0, -0.5, 2.1)
-    x_m, _y_m, z_m = document.estimated(0, NEAR_BOX).center_m  # not the recorded 2.0 m
-    assert z_m == pytest.approx(2.09)
-    assert document.errors(0) == pytest.approx((x_m + 0.5, z_m - 2.1, np.hypot(x_m + 0.5, z_m - 2.1)))
-    document.choose_person(0, 1)
-    assert document.errors(0) is None  # each person has a truth of its own
-    document.set_truth(0, 0.7, 3.0)
-    assert document.errors(0)[1] == pytest.approx(0.09, abs=0.01)
-    assert document.measurements[0].truths == {0: (-0.5, None, 2.1), 1: (0.7, None, 3.0)}
-    for number in (-1, 2):
-        with pytest.raises(ValueError, match='detection %d .*2 detections' % number):
-            document.choose_person(0, number)
-
-
 def test_truth_is_saved_immediately_and_read_by_benchmarks(document, folder):
-    document.set_truth(1, 0.1, 2.3)
+    document.set_truths([1], 0.1, 2.3)
     document.choose_person(2, 1)
-    document.set_truth(2, 0.1, 2.3, -0.05)
+    document.set_truths([2], 0.1, 2.3, -0.05)
     entries = read_json(folder)['frames']
     assert entries[1]['truth_mm'] == {'x': 100, 'z': 2300} and entries[2]['truth_mm'] == {'x': 100, 'z': 2300, 'y': -50}
     frames = read_session(folder).frames
@@ -56,17 +39,6 @@ def test_truth_is_saved_immediately_and_read_by_benchmarks(document, folder):
     assert frames[2].boxes_px == (FAR_BOX, NEAR_BOX) and frames[2].estimate_m.tolist() == [0.7, 0.1, 3.0]
     assert frames[0].stamp_ns == 1616161616000000005 and frames[0].label == 'by the door'
     assert Document.open(folder).measurements[2].truth_m == (0.1, -0.05, 2.3)
-
-
-def test_rejected_measurements_are_skipped_and_can_be_restored(document, folder):
-    document.set_truth(0, 0.1, 2.0)
-    document.reject(0, ' arm in front ')
-    assert document.measurements[0].rejected == 'arm in front' and states(document)[0] == 'rejected'
-    assert document.progress == (1, 4) and [frame.id for frame in read_session(folder).frames] == ['m1', 'm2', 'm3']
-    document.restore(0)
-    assert states(document)[0] == 'annotated' and len(read_session(folder).frames) == 4
-    with pytest.raises(ValueError, match='reason'):
-        document.reject(0, '  ')
 
 
 @settings(max_examples=25)
@@ -79,7 +51,7 @@ def test_after_any_edits_the_file_is_what_is_shown_and_undo_leads_back(tmp_path_
         if kind in ('undo', 'redo'):
             getattr(document, kind)()
         else:
-            {'truth': lambda: document.set_truth(index, number, 1 + number), 'reject': lambda: document.reject(
+            {'truth': lambda: document.set_truths([index], number, 1 + number), 'reject': lambda: document.reject(
                 index, 'no'), 'restore': lambda: document.restore(index),
              'person': lambda: document.choose_person(index, number)}[kind]()
     shown, saved = ([(one.truth_m, one.person, one.rejected) for one in source.measurements]
@@ -92,7 +64,7 @@ def test_after_any_edits_the_file_is_what_is_shown_and_undo_leads_back(tmp_path_
 
 def test_measurements_added_by_a_viewer_are_kept_and_shown(document, folder):
     change_json(folder, lambda content: content['frames'].append(write_measurement(folder, 'new')))
-    document.set_truth(0, 0.1, 2.0)
+    document.set_truths([0], 0.1, 2.0)
     assert [entry['id'] for entry in read_json(folder)['frames']] == ['m0', 'm1', 'm2', 'm3', 'new']
     assert document.measurements[4].id == 'new' and document.progress == (1, 5)
     assert not document.refresh()  # only its own edit
@@ -104,9 +76,9 @@ def test_measurements_added_by_a_viewer_are_kept_and_shown(document, folder):
 
 def test_two_annotators_keep_the_fields_of_each_other(document, folder):
     other = Document.open(folder)
-    document.set_truth(0, 0.1, 2.0)
+    document.set_truths([0], 0.1, 2.0)
     other.add_box(0, (1, 1, 30, 40))
-    other.set_truth(1, 0.3, 2.2)
+    other.set_truths([1], 0.3, 2.2)
     assert read_json(folder)['frames'][0]['truth_mm'] == {'x': 100, 'z': 2000}
     assert document.refresh() and len(document.measurements[0].detections) == 3
     assert states(document)[1] == 'annotated'
@@ -117,36 +89,21 @@ def test_two_annotators_keep_the_fields_of_each_other(document, folder):
 def test_an_edit_that_cannot_be_saved_raises_an_error_and_changes_nothing(document, folder):
     with open(os.path.join(folder, 'frames.json'), 'w') as stream:
         stream.write('{"frames"')
-    for edit in (lambda: document.set_truth(0, 0.1, 2.0), document.refresh):
+    for edit in (lambda: document.set_truths([0], 0.1, 2.0), document.refresh):
         with pytest.raises(SessionError, match='frames.json|cannot be saved'):
             edit()
     assert states(document) == ['new'] * 4 and not document.can_undo
     os.rename(folder, folder + '-gone')
     with pytest.raises(SessionError, match='cannot be saved'):
-        document.set_truth(0, 0.1, 2.0)
+        document.set_truths([0], 0.1, 2.0)
 
 
 def test_the_truth_belongs_to_the_nearest_box_unless_one_was_selected(document):
-    document.set_truth(0, 0.72, 2.9)
+    document.set_truths([0], 0.72, 2.9)
     assert document.measurements[0].person == 1 and document.errors(0)[2] < 0.25
     document.choose_person(1, 0)
-    document.set_truth(1, 0.72, 2.9)
+    document.set_truths([1], 0.72, 2.9)
     assert document.measurements[1].person == 0
     document.choose_person(1, 1)
-    document.set_truth(1, 0.72, 2.9)  # nobody else can be there
+    document.set_truths([1], 0.72, 2.9)  # nobody else can be there
     assert document.measurements[1].truths == {1: (0.72, None, 2.9)}
-
-
-def test_boxes_are_replaced_and_deleted_with_their_truth(document, folder):
-    document.set_truth(0, -0.5, 2.1)
-    document.replace_box(0, (11, 5, 25, 44))
-    box = opened(folder)[0].detections[0]
-    assert box.box_px == (11, 5, 25, 44) and box.by_hand and opened(folder)[0].truth_m == (-0.5, None, 2.1)
-    document.delete_box(0)
-    assert [one.box_px for one in opened(folder)[0].detections] == [FAR_BOX] and opened(folder)[0].truths == {}
-    document.undo()
-    assert opened(folder)[0].truths == {0: (-0.5, None, 2.1)}
-
-
-def opened(folder):
-    return Document.open(folder).measurements

@@ -30,12 +30,6 @@ def test_a_box_drawn_by_hand_replaces_that_of_the_same_person(document, folder):
     assert read_session(folder).frames[0].boxes_px == (NEAR_BOX, FAR_BOX)
 
 
-def test_a_box_without_depth_is_added_without_estimate(document):
-    cv2.imwrite(document.measurements[0].depth_path, np.zeros((48, 64), np.uint16))
-    assert document.add_box(0, (1, 1, 9, 9)) is None
-    assert document.estimates.of(0)[2] is None and document.measurements[0].person == 2
-
-
 @pytest.mark.parametrize('break_it', [
     lambda document: os.remove(document.measurements[0].depth_path),
     lambda document: cv2.imwrite(document.measurements[0].depth_path, np.zeros((48, 64), np.uint16))])
@@ -43,5 +37,5 @@ def test_truth_can_be_entered_for_a_box_that_cannot_be_estimated(document, folde
     change_json(folder, lambda content: content['frames'][0]['detections'][0].pop('estimate_mm'))
     document.refresh()
     break_it(document)
-    document.set_truth(0, 0.1, 2.0)
+    document.set_truths([0], 0.1, 2.0)
     assert document.measurements[0].truth_m == (0.1, None, 2.0) and document.errors(0) is None

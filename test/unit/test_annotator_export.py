@@ -9,7 +9,7 @@ from support.small_session import NEAR_BOX
 
 
 def test_a_row_contains_box_estimates_and_truth_in_all_axes(document, tmp_path):
-    document.set_truth(0, -0.5, 2.1004, 0.01)
+    document.set_truths([0], -0.5, 2.1004, 0.01)
     path = str(tmp_path / 'table.csv')
     assert export(document, path, 'foreground') == 1
     with open(path, newline='') as stream:

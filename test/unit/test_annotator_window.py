@@ -1,5 +1,4 @@
 """Annotation in the window by key presses and clicks, which are saved in the session."""
-
 import numpy as np
 import pytest
 
@@ -25,14 +24,13 @@ def test_the_error_of_a_typed_truth_is_shown_and_enter_saves_it(drive, folder):
 
 
 @pytest.mark.parametrize('x, z, problem, field', [
-    ('12e', '2000', "X: '12e' is not a length", 'x'), ('100', '', 'Z: a length is missing', 'z'),
-    ('-500', '', 'Z: a length is missing', 'z'), ('100', '2000000', 'at most 100 m expected', 'z')])
+    ('12e', '2000', "X: '12e' is not a length", 'x'), ('100', '', 'Z: a length is missing', 'z')])
 def test_invalid_truth_is_reported_next_to_the_fields(drive, x, z, problem, field):
     drive.press(x, Qt.Key_Tab, z, Qt.Key_Return)
     truth = drive.window.pane.truth
     assert problem in truth.hint_label.text() and drive.window.current == 0
     assert drive.measurement(0).state == 'new' and truth.fields['z'].text() == z
-    assert field is None or truth.fields[field].hasFocus()
+    assert truth.fields[field].hasFocus()
 
 
 @pytest.mark.parametrize('name', ['color_view', 'depth_view'])

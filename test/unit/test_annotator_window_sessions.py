@@ -46,7 +46,7 @@ def test_changes_by_other_programs_are_shown(fast_refresh, window_on, folder):
     assert drive.window.current == 0 and drive.window.pane.truth.fields['x'].text() == ''
 
 
-def test_a_measurement_in_place_of_a_deleted_one_is_shown_with_its_own_image(fast_refresh, window_on, folder):
+def test_a_measurement_after_a_deleted_one_is_shown_with_its_image(fast_refresh, window_on, folder):
     drive = window_on(folder)
     drive.window.show_measurement(3)
     before_m = drive.document.estimates.of(3)[0][2]

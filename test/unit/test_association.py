@@ -1,4 +1,4 @@
-"""The costs of pairs of tracks and measurements: the same for few and for many, and for any first look."""
+"""The costs of pairs of tracks and measurements: the same for few and for many, and for any first look; and matches."""
 from unittest import mock
 
 import numpy as np
@@ -57,15 +57,6 @@ def test_crowds_have_the_same_costs(seed):
         crowd = allowed_costs(*given_scene)
     assert set(few) == set(crowd)
     assert [crowd[pair] for pair in few] == pytest.approx(list(few.values()))
-
-
-@given(SEEDS)
-def test_tracks_and_measurements_are_matched_once_within_a_group(seed):
-    tracks, measurements, params, outliers = scene(seed)
-    matches = associate(tracks, measurements, 0, params, outliers)
-    for members in zip(*matches):
-        assert len(set(map(id, members))) == len(matches)
-    assert all(track.kind.group == measurement.kind.group for track, measurement in matches)
 
 
 def test_a_newcomer_does_not_push_a_person_to_the_track_of_another_one():

@@ -19,13 +19,6 @@ def test_an_error_does_not_change_the_file(tmp_path):
     assert (tmp_path / 'frames.json').read_bytes() == before
 
 
-def test_a_failed_write_leaves_no_temporary_file(tmp_path):
-    (tmp_path / 'folder').mkdir()
-    with pytest.raises(OSError):
-        atomic_write(str(tmp_path / 'folder'), b'data')
-    assert os.listdir(str(tmp_path)) == ['folder']
-
-
 def test_the_file_mode_follows_the_umask(tmp_path):
     mask = os.umask(0o027)
     try:

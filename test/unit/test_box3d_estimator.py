@@ -1,15 +1,15 @@
-"""3D box estimators: recorded positions and grid of the thesis, depth layers, distortion, and invalid input."""
+"""3D box estimators: recorded positions and grid of the thesis, people before others, distortion, and invalid input."""
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from conftest import DATA
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.object_classes import PERSON_CLASS
-from ros_3d_bb.estimation.box3d import ImageGeometry, complete_truncated_extent, truncated_edges
-from ros_3d_bb.estimation.box3d_estimator import (check_rect, estimate_boxes, estimate_median, estimator_named,
-                                                  sample_depth, sample_grid)
-from ros_3d_bb.estimation.depth_samples import GRID_COLUMNS, GRID_ROWS
+from ros_3d_bb.estimation.box3d import ImageGeometry, truncated_edges
+from ros_3d_bb.estimation.box3d_estimator import (estimate_boxes, estimate_median, estimator_named, sample_depth,
+                                                  sample_grid)
 from ros_3d_bb.estimation.foreground import estimate_foreground
 from ros_3d_bb.sessions.session_reader import read_depth, read_session
 
@@ -24,6 +24,7 @@ def flat(depth, scale_m=0.001, dtype=np.uint16):
     return DepthImage(np.full((48, 64), depth, dtype), scale_m)
 
 
+@pytest.mark.skipif(not DATA, reason='needs the recorded positions of the thesis')
 def test_the_median_reproduces_the_recorded_positions(session_folder):
     """Within 1 mm an axis, plus the rounding of the record to whole millimetres."""
     session = read_session(session_folder)
@@ -48,14 +49,6 @@ def test_the_grid_is_centred_and_clipped_to_the_image(x1, y1, width, height, str
     assert [tuple(pixel) for pixel in samples.pixels.reshape(-1, 2).tolist()] == expected
 
 
-@pytest.mark.parametrize('rect', [(10, 10, 10, 20), (20, 10, 10, 20), (10, 20, 20, 10), (10 ** 9, 0, 2 * 10 ** 9, 9)])
-def test_rectangles_without_samples(rect):
-    assert sample_depth(flat(1000), rect, 7).valid.size == sample_grid(flat(1000), rect).valid.size == 0
-    if rect[0] < 64:
-        with pytest.raises(ValueError, match=r'box \(%d, %d, %d, %d\)' % rect):
-            check_rect(rect)
-
-
 @pytest.mark.parametrize('depth,scale_m,dtype', [(0, 0.001, np.uint16), (np.nan, 1, np.float32),
                                                  (np.inf, 1, np.float32), (-1, 1, np.float32)])
 def test_no_estimate_without_valid_depth(depth, scale_m, dtype):
@@ -64,14 +57,6 @@ def test_no_estimate_without_valid_depth(depth, scale_m, dtype):
     for name in ('foreground', 'median'):
         outside = estimate_boxes(flat(2000), [(70, 10, 90, 20)], CAMERA, estimator_named(name))
         assert estimate_boxes(image, [(0, 0, 64, 48)], CAMERA, estimator_named(name)) == outside == [None]
-
-
-@pytest.mark.parametrize('depth', [flat(3000), flat(3.0, 1.0, np.float32)])
-def test_size_is_that_of_the_box_at_the_median_depth(depth):
-    rect = (10, 10, 40, 40)
-    box = estimate_median(sample_depth(depth, rect, 5), rect, of(CAMERA))
-    np.testing.assert_allclose(box.size_m, [30 / 60 * 3, 30 / 60 * 3, 30 / 60 * 3])
-    assert box.support == 1.0 and not box.truncated and box.rect_px == rect and box.center_m[2] == 3.0
 
 
 def test_support_is_the_share_of_samples_with_depth_that_are_on_the_body():
@@ -123,20 +108,6 @@ def test_foreground_ignores_flying_pixels():
     assert box.center_m[2] == pytest.approx(2.0 + PERSON_CLASS.axis)
 
 
-def test_boxes_do_not_depend_on_the_other_boxes_in_the_image():
-    """A row of people side by side, estimated together and one by one."""
-    depth = DepthImage(np.full((480, 640), 6000, np.uint16), 0.001)
-    rects = [(80 * number, 100 - 5 * number, 80 * number + 60, 400) for number in range(8)]
-    for number, (x1, y1, x2, y2) in enumerate(rects):
-        depth.values[y1 + 10:y2 - 10, x1 + 10:x2 - 10] = 2000 + 300 * number
-    camera = Camera(640, 480, 600, 600, 319.5, 239.5)
-    for box, rect in zip(estimate_foreground(depth, rects, of(camera), [PERSON_CLASS] * len(rects)), rects):
-        alone = foreground(depth, rect, camera=camera)
-        np.testing.assert_array_equal(box.center_m, alone.center_m)
-        np.testing.assert_array_equal(box.size_m, alone.size_m)
-        assert (box.rect_px, box.support) == (rect, alone.support)
-
-
 def test_occluders_of_occluders_mask_pixels():
     """Three people in a row, each covering half of the next: without the nearest one, the second would be wrong."""
     depth = flat(6000)
@@ -144,25 +115,6 @@ def test_occluders_of_occluders_mask_pixels():
     rects = [(30, 4, 54, 42), (18, 4, 42, 43), (6, 4, 30, 44)]
     boxes = estimate_foreground(depth, rects, of(CAMERA), [PERSON_CLASS] * 3)
     np.testing.assert_allclose([box.center_m[2] - PERSON_CLASS.axis for box in boxes], [4, 3, 2], atol=1e-9)
-
-
-@given(st.integers(-90, 80), st.integers(-90, 80), st.integers(1, 2 ** 31), st.integers(1, 200))
-def test_the_grid_of_the_foreground_covers_the_visible_part(x1, y1, width, height):
-    samples = sample_grid(flat(1000), (x1, y1, x1 + width, y1 + height))
-    for ticks, most, low, high in ((samples.columns, GRID_COLUMNS, max(x1, 0), min(x1 + width, 64)),
-                                   (samples.rows, GRID_ROWS, max(y1, 0), min(y1 + height, 48))):
-        assert len(ticks) == 0 if low >= high else (most / 2 <= len(ticks) <= most or len(ticks) == high - low)
-        stride = max(np.diff(ticks), default=1)
-        assert len(ticks) == 0 or (low <= ticks[0] < low + stride and high - stride <= ticks[-1] < high)
-
-
-@pytest.mark.parametrize('background_mm', [0, 5000])
-def test_foreground_needs_a_minimum_support(background_mm):
-    """A fiftieth of the box is not enough for a person."""
-    depth = flat(background_mm)
-    depth.values[20:24, 30:33] = 2000
-    box = foreground(depth, (20, 10, 42, 40))
-    assert box is None or box.center_m[2] > 4.9
 
 
 def test_sparse_depth_has_full_support():
@@ -173,7 +125,7 @@ def test_sparse_depth_has_full_support():
     assert box.support == 1 and box.center_m[2] == pytest.approx(2.0 + PERSON_CLASS.axis)
 
 
-@pytest.mark.parametrize('pixels', [1, 2, 3, 11])
+@pytest.mark.parametrize('pixels', [1, 3])
 def test_a_box_of_few_pixels_has_a_position(pixels):
     depth = flat(0)
     depth.values[10, 10:10 + pixels] = 3000 + 10 * np.arange(pixels)
@@ -187,22 +139,7 @@ def test_depths_beyond_any_camera_are_ignored():
     depth.values[10, 10], depth.values[20, 20] = 1e30, 1e7
     box = foreground(depth, (5, 5, 60, 45))
     assert box.center_m[2] == pytest.approx(2.0 + PERSON_CLASS.axis) and box.support == 1
-
-
-def test_depths_of_less_than_a_millimetre_give_no_box():
-    assert foreground(flat(1e-5, 1.0, np.float32), (5, 5, 60, 45)) is None
-
-
-@pytest.mark.parametrize('name', ['foreground', 'median'])
-def test_boxes_are_in_the_order_of_their_rectangles(name):
-    depth = flat(5000)
-    depth.values[10:40, 30:50] = 3000
-    depth.values[5:45, 10:34] = 2000
-    depth.values[:, 60:] = 0
-    rects = [(28, 10, 50, 40), (60, 0, 64, 40), (10, 5, 34, 45)]
-    far, none, near = estimate_boxes(depth, rects, CAMERA, estimator_named(name))
-    assert none is None and near.rect_px == rects[2] and far.rect_px == rects[0]
-    assert near.center_m[2] < 2.2 and far.center_m[2] > near.center_m[2] + 0.4
+    assert foreground(flat(1e-5, 1.0, np.float32), (5, 5, 60, 45)) is None  # less than a millimetre
 
 
 @pytest.mark.parametrize('name,stride,complaint', [('mean', 20, "estimator is 'mean'"), ('median', 0, 'stride is 0')])
@@ -250,16 +187,6 @@ def test_lens_distortion_is_corrected(camera, x_m):
     assert x_m == 0 or abs(flat.center_m[0] - axis_m[0]) > 0.08
 
 
-@pytest.mark.parametrize('camera', [WIDE, FISHEYE], ids=['plumb_bob', 'equidistant'])
-def test_the_median_is_that_of_undistorted_points(camera):
-    """The rectangle of a small plate, and depth that fills it, so that the median is in its middle."""
-    center_m = np.array([1.5, 0.3, 3.0])
-    _depth, rect = plate_in(camera, center_m, (0.1, 0.1))
-    box = estimate_median(sample_depth(DepthImage(np.full((480, 640), 3.0), 1.0), rect, 1), rect, of(camera))
-    np.testing.assert_allclose(box.center_m, center_m, atol=0.01)  # a pixel
-    np.testing.assert_allclose(box.size_m, 0.1, atol=0.03)
-
-
 @pytest.mark.parametrize('name', ['foreground', 'median'])
 def test_no_estimate_at_right_angles_to_the_axis_of_a_fisheye(name):
     camera = Camera(640, 480, 150, 150, 319.5, 239.5, 'equidistant', (0, 0, 0, 0))
@@ -271,11 +198,3 @@ def test_no_estimate_at_right_angles_to_the_axis_of_a_fisheye(name):
 def test_a_rectangle_beyond_the_image_of_a_distorting_lens_has_an_estimate():
     rect = (-2 ** 31, 100, 300, 2 ** 31 - 1)
     assert np.isfinite(foreground(DepthImage(np.full((480, 640), 2.0), 1.0), rect, camera=WIDE).center_m).all()
-
-
-def test_a_truncated_body_is_completed_at_the_truncated_end():
-    np.testing.assert_allclose(complete_truncated_extent(-0.1, 0.2, True, False, 0.5), (-0.3, 0.2))
-    np.testing.assert_allclose(complete_truncated_extent(-0.1, 0.2, False, True, 0.5), (-0.1, 0.4))
-    for cut in (False, True):
-        assert complete_truncated_extent(-0.1, 0.2, cut, cut, 0.5) == (-0.1, 0.2)
-    assert complete_truncated_extent(-0.5, 0.5, True, False, 0.5) == (-0.5, 0.5)

@@ -23,15 +23,6 @@ def moments(*images):
     return [Moment(number * NS // 2, truth, tracks) for number, (truth, tracks) in enumerate(images)]
 
 
-def test_a_person_with_one_track():
-    result = score(moments(*[([at(1, 3 + 0.1 * n, 0)], [at(7, 3 + 0.1 * n, 0.3)]) for n in range(5)]))
-    person, = result.people
-    assert (person.person, person.ids, person.switches, person.followed) == (1, [7], 0, 1.0)
-    assert person.visible_s == pytest.approx(2.0)
-    assert person.rmse_m == person.worst_m == pytest.approx(0.3)
-    assert result.false_share == 0
-
-
 @pytest.mark.needs('trackeval')
 @given(st.integers(0, 2 ** 32 - 1))
 def test_id_switches_are_those_of_trackeval(seed):

@@ -82,19 +82,16 @@ def jpeg_declaring(width, height):
 JPEG_BYTES, PNG_BYTES, DEPTH_BYTES = encoded('.jpg', SMOOTH), encoded('.png', SMOOTH), compressed_depth(DEPTH_MM)
 RVL_BYTES, QUANTIZED_BYTES = compressed_depth(DEPTH_MM, True), compressed_depth(DEPTH_M)
 COLORS = [('rgb8; jpeg compressed bgr8', data, word) for data, word in (
-    (b'', 'neither'), (b'\xff\xd8', 'damaged'), (JPEG_BYTES[:len(JPEG_BYTES) // 2], 'truncated'),
-    (PNG_BYTES[:len(PNG_BYTES) // 2], 'truncated'), (PNG_BYTES[:60] + bytes(9) + PNG_BYTES[69:], 'damaged'),
-    (b'GIF89a' + bytes(99), 'neither'), (jpeg_declaring(65500, 65500), '65500 x 65500'),
-    (jpeg_declaring(0, 9), '0 x 9'),
+    (b'GIF89a' + bytes(99), 'neither'), (JPEG_BYTES[:len(JPEG_BYTES) // 2], 'truncated'),
+    (PNG_BYTES[:60] + bytes(9) + PNG_BYTES[69:], 'damaged'), (jpeg_declaring(65500, 65500), '65500 x 65500'),
     (png_declaring(2 ** 31 - 1, 2 ** 31 - 1), '2147483647'), (encoded('.png', DEPTH_MM), "encoding '16UC1'"))]
-DEPTHS = [(DEPTH, b'', 'truncated'), (DEPTH, DEPTH_BYTES[:12], 'neither'), (DEPTH, DEPTH_BYTES[:99], 'truncated'),
-          (DEPTH, bytes(12) + PNG_BYTES, '16-bit'), (DEPTH, bytes(12) + png_declaring(60000, 60000), '60000 x 60000'),
+DEPTHS = [(DEPTH, b'', 'truncated'), (DEPTH, bytes(12) + PNG_BYTES, '16-bit'),
+          (DEPTH, bytes(12) + png_declaring(60000, 60000), '60000 x 60000'),
           (QUANTIZED, struct.pack('<iff', 0, float('nan'), 0) + QUANTIZED_BYTES[12:], 'quantization'),
-          ('8UC1; compressedDepth', DEPTH_BYTES, 'encoding'), ('compressedDepth', DEPTH_BYTES, 'encoding'),
-          (DEPTH + ' rvl', RVL_BYTES[:15], 'truncated'), (DEPTH + ' rvl', RVL_BYTES[:-400], 'pixels'),
+          ('8UC1; compressedDepth', DEPTH_BYTES, 'encoding'), (DEPTH + ' rvl', RVL_BYTES[:-400], 'pixels'),
           (DEPTH + ' rvl', RVL_BYTES[:12] + struct.pack('<II', 2 ** 31, 2 ** 31) + RVL_BYTES[20:], '2147483648'),
           (DEPTH + ' rvl', RVL_BYTES[:20] + b'\xff' * 400 + bytes(4), 'damaged'),
-          ('16UC1; jpeg compressed ', JPEG_BYTES, 'depth'), ('16UC1; png compressed ', PNG_BYTES, 'depth')]
+          ('16UC1; jpeg compressed ', JPEG_BYTES, 'depth')]
 CASES = [(imgmsg_to_rgb,) + case for case in COLORS] + [(imgmsg_to_depth,) + case for case in DEPTHS]
 
 
@@ -104,18 +101,3 @@ def test_unusable_data_are_rejected_by_type_and_format(read, format_text, data, 
         read(message_of(format_text, data))
     text = str(caught.value)
     assert 'sensor_msgs/CompressedImage' in text and repr(format_text) in text and word in text
-
-
-@given(st.sampled_from([JPEG_BYTES, PNG_BYTES, DEPTH_BYTES, RVL_BYTES, QUANTIZED_BYTES]),
-       st.sampled_from([DEPTH, DEPTH + ' rvl', QUANTIZED, 'bayer_rggb8; png', 'bayer_rggb16; jpeg', 'png', '']),
-       st.lists(st.tuples(st.integers(0, 4000), st.integers(0, 255)), max_size=4), st.integers(0, 4000))
-def test_an_image_is_decoded_or_rejected(data, format_text, changes, end):
-    data = bytearray(data[:end])
-    for at, value in changes:
-        if at < len(data):
-            data[at] = value
-    for read in (imgmsg_to_rgb, imgmsg_to_depth):
-        try:
-            read(message_of(format_text, bytes(data)))
-        except ValueError:
-            pass

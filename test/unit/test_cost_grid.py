@@ -1,5 +1,4 @@
 """Costs of predicted positions around the robot, against the probability of presence."""
-
 import numpy as np
 import pytest
 
@@ -48,12 +47,6 @@ def test_costs_follow_the_probability_of_presence():
         nearest_m = min(4.0, max(2.0, x_m))
         expected = (np.hypot(*(offsets + [nearest_m - x_m, -y_m]).T) < RADIUS_M).mean()
         assert cost_at(costs, x_m, y_m) / float(HIGHEST) * RISKY == pytest.approx(expected, abs=0.02)
-
-
-def test_costs_decrease_as_the_prediction_becomes_uncertain():
-    costs = presence_costs([walking((-2.0, 0.0), (2.0, 0.0), (0.1, 1.5))], np.eye(4), ROBOT_RADIUS_M)
-    along = [int(cost_at(costs, x_m, 0.05)) for x_m in np.arange(-1.95, 2.0, 0.5)]
-    assert along[0] == HIGHEST and along == sorted(along, reverse=True) and along[-1] < HIGHEST / 2
 
 
 def test_a_robot_in_the_way_pays_only_for_going_further_into_it():

@@ -15,7 +15,7 @@ from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import VISIBLE, CameraView, Detection
 from ros_3d_bb_lab.evaluation.noise import __main__ as command
 from ros_3d_bb_lab.evaluation.noise.recordings import fit_recordings, lasting_errors
-from ros_3d_bb_lab.evaluation.tracking.recorded_detections import RecordedRun, with_error_model
+from ros_3d_bb_lab.evaluation.tracking.recorded_detections import RecordedRun
 from ros_3d_bb_lab.evaluation.tracking.run_generator import Image, RunTruth
 
 CAMERA = Camera(640, 480, 533.0, 533.0, 319.5, 239.5)
@@ -70,13 +70,6 @@ def test_long_recordings_fit_into_memory():
     tracemalloc.stop()
     assert peak < 1e8  # it grew with the square of the number of errors, to 10 times as much here
     assert lasting_m == pytest.approx(0.1, abs=0.03) and 0.05 < time_s < 1
-
-
-def test_the_model_gives_recorded_boxes_covariances(run):
-    model = fit_recordings([run], 'made', 'none')._replace(z_bias=(0.5,))
-    box, = with_error_model(run, model).images[0].detections[:1]
-    assert box.position_m[0] == pytest.approx(run.images[0].detections[0].position_m[0] - 0.5, abs=0.01)
-    assert box.covariance_m2[0, 0] == pytest.approx(model.z_sigma.at(box.position_m[0]) ** 2, rel=0.01)
 
 
 def test_the_command_writes_the_model(tmp_path, monkeypatch, capsys, run):

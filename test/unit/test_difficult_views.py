@@ -1,34 +1,27 @@
 """Positions where cameras are tilted, people overlap, or the image border truncates them, on simulated scenes."""
-import os
-
 import numpy as np
 import pytest
 
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import LEVEL, plausible
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
-from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.types import CameraView, detections_from_boxes
-from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL
+from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_path
 from ros_3d_bb_lab.simulation.scenario import read_scenario, scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
 
-SCENARIOS = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'scenarios')
 SCATTER = 0.015  # standard deviation of the edges of detected boxes, relative to the box
 CHI_SQUARE_95 = 5.991  # 2 degrees of freedom
 
 pytestmark = pytest.mark.slow
 
 
-def simulator_of(people, height_m, tilt_deg=0, seconds=0.2, rate=5.0, seed=0, furniture=(), wall_m=14.0,
-                 objects=()):
+def simulator_of(people, height_m, tilt_deg=0, seconds=0.2, rate=5.0, seed=0, furniture=(), wall_m=14.0):
     robot = {'mount': [0.0, 0.0, height_m - 0.065], 'pitch': np.radians(tilt_deg)}
     room = {'bounds': [-4.0, wall_m, -7.0, 7.0], 'height': 4.0, 'furniture': list(furniture)}
     return Simulator(scenario_from({'duration': seconds, 'rate': rate, 'seed': seed, 'robot': robot, 'people': people,
-                                    'room': room, 'objects': list(objects)}))
+                                    'room': room}))
 
 
 def overlapping_people(count, nearest_m, farthest_m, random):
@@ -102,7 +95,7 @@ def depths_m(simulator):
 @pytest.mark.parametrize('nearest_mm', [500, 700])
 @pytest.mark.parametrize('name', ['high_mount', 'jackal', 'child', 'tall'])
 def test_a_person_too_near_for_the_depth_camera_is_not_the_wall(name, nearest_mm):
-    simulator = Simulator(read_scenario(os.path.join(SCENARIOS, 'approach_%s.yaml' % name)))
+    simulator = Simulator(read_scenario(scenario_path('approach_' + name)))
     too_near = 0
     for number in range(90, 180, 15):
         frame = simulator.frame(number)
@@ -200,27 +193,16 @@ def test_a_person_who_crouches_behind_a_chest(camera_m, start_m, facing, height_
     assert box.center_m[2] == pytest.approx(depths_m(simulator)[0], abs=0.3)
 
 
-@pytest.mark.parametrize('height_m', [0.27, 0.9])
-@pytest.mark.parametrize('crouch', [0, 0.7])
-def test_a_person_before_a_pillar_in_a_loose_box(height_m, crouch):
-    simulator = simulator_of([{'start': [3.0, 0.1], 'facing': 2.6, 'height': 1.75, 'crouch': crouch}], height_m,
-                             furniture=[{'at': [4.0, 0.1], 'size': [0.25, 0.3, 2.4]}], wall_m=5.0)
-    left, top, right, bottom = simulator.frame(0).people[0].box_px
-    more_px = (bottom - top) // 6
-    box, = level_boxes(simulator, [(left - more_px, top - more_px, right + more_px, bottom)])
-    assert box.center_m[2] == pytest.approx(depths_m(simulator)[0], abs=0.3)
-
-
 POSES = {'still': {}, 'left arm out': dict(lift_l=1.57), 'right arm out': dict(lift_r=1.57),
          'both out': dict(lift_l=1.57, lift_r=1.57), 'left arm up': dict(lift_l=2.9),
          'both up': dict(lift_l=2.9, lift_r=2.9), 'bent': dict(bend=0.7)}
 
 
-def posed_person(angles, ahead_m, facing, height_m, tilt_deg, objects=()):
+def posed_person(angles, ahead_m, facing, height_m, tilt_deg):
     """Errors of the 3D box of a person in a posture, metres: sideways, of the height without arms, and of the height of
     the centre above the floor."""
     simulator = simulator_of([{'start': [ahead_m, 0.2], 'facing': facing, 'height': 1.7}], height_m, tilt_deg,
-                             objects=objects, wall_m=6.0)
+                             wall_m=6.0)
     state = simulator.state_at(0)
     person, = state.people
     posture = person.posture._replace(**angles)
@@ -244,30 +226,6 @@ def test_arms_and_bending_do_not_move_the_axis_or_change_the_height(ahead_m, hei
     assert np.abs(up_m).max() < 0.05
 
 
-@pytest.mark.parametrize('facing', [2.2, 1.57, 4.4])
-def test_a_person_who_bends_and_reaches_aside(facing):
-    assert abs(posed_person({'bend': 0.7, 'reach': 0.9}, 2.8, facing, 0.9, 0)[0]) < 0.08
-
-
-@pytest.mark.parametrize('facing', [3.14, 2.2, 1.57])
-@pytest.mark.parametrize('ahead_m,height_m,tilt_deg', [(4.2, 0.9, 0), (3.4, 2.35, 28)])
-def test_a_person_who_carries_a_box(ahead_m, height_m, tilt_deg, facing):
-    parcel = {'label': 'parcel', 'start': [ahead_m + 0.35 * np.cos(facing), 0.2 + 0.35 * np.sin(facing)],
-              'facing': facing, 'size': [0.3, 0.4, 0.3], 'above': 0.9}
-    errors_m = posed_person({'reach': 0.9}, ahead_m, facing, height_m, tilt_deg, [parcel])
-    assert abs(errors_m[0]) < 0.08 and np.abs(errors_m[1:]).max() < (0.08 if tilt_deg else 0.13)
-
-
-def test_heights_below_a_tilted_camera():
-    scenes = [simulator_of([{'start': [3.4, 0.4 * side], 'facing': 3.0, 'height': 1.75}], 2.35, 28, seed=seed)
-              for seed, side in enumerate((-2, -1, 0, 1, 2))]
-    found, missed = estimates(scenes, knows_tilt=True, least_visible=0.95)
-    assert len(found) == 5 and missed == 0
-    for person, box, camera_from_map in found:
-        up_m = transform_points(np.linalg.inv(camera_from_map), box.center_m)[2]
-        assert abs(up_m - person.position_m[2]) < 0.1 and abs(box.size_m[1] - 1.75) < 0.2
-
-
 def test_covariances_hold_for_any_support():
     """95 % ellipses of about 90 people in each third of support, in crowds to which it was not fitted."""
     model = read_error_model(SIMULATED_ERROR_MODEL)
@@ -284,22 +242,3 @@ def test_covariances_hold_for_any_support():
     third = np.digitize(supports, np.percentile(supports, [100 / 3, 200 / 3]))
     coverage = [np.mean(np.array(distances)[third == number] < CHI_SQUARE_95) for number in range(3)]
     assert all(0.88 <= share for share in coverage) and np.mean(coverage) < 0.99, coverage
-
-
-def test_a_person_cut_at_the_hips_is_one_track_of_one_height():
-    simulator = simulator_of([{'start': [1.6, 0.1], 'facing': 3.1, 'height': 1.75}], 1.5, -2, 3.4, 30.0)
-    tracker, random, heights_m, ids = Tracker(), np.random.RandomState(5), [], set()
-    for number in range(100):
-        frame = simulator.frame(number)
-        (left, top, right, bottom), = [person.box_px for person in frame.people]
-        assert bottom == 480
-        rect_px = left, top, right, bottom - random.randint(0, 9)
-        box, = estimate_boxes(DepthImage(frame.depth_mm, 0.001), [rect_px], simulator.camera,
-                              estimator_named('foreground'))
-        map_from_camera = frame.poses.map_from_camera
-        tracks = tracker.update(int(frame.time_s * NS), detections_from_boxes({0: box}, map_from_camera),
-                                CameraView(map_from_camera, simulator.camera))
-        ids |= {track.id for track in tracks}
-        heights_m += [track.size_m[2] for track in tracks]
-    assert len(ids) == 1 and len(heights_m) > 90
-    assert np.ptp(heights_m) < 0.1

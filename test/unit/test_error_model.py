@@ -9,8 +9,8 @@ from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.estimation.box3d import Box3D
-from ros_3d_bb.estimation.error_model import (STEEPEST_BIAS, Scores, Spread, XBias, checked, corrected_boxes,
-                                              read_error_model, write_error_model)
+from ros_3d_bb.estimation.error_model import (Scores, Spread, XBias, checked, corrected_boxes, read_error_model,
+                                              write_error_model)
 from support.error_models import MODEL
 
 SHIPPED = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'error_models')
@@ -23,14 +23,6 @@ models = st.builds(lambda z, x, angle, offset: MODEL._replace(z_bias=z, x_bias=X
 @given(models, st.lists(positions, min_size=1, max_size=5))
 def test_correction_is_the_inverse_of_the_bias(model, true_m):
     assert np.allclose(checked(model).corrected(model.biased(true_m)), true_m, atol=1e-5)
-
-
-@given(positions)
-def test_positions_are_corrected_independently(measured_m):
-    together = MODEL.corrected([[measured_m, (0.1, 0.2, 1.0)]])
-    assert together.shape == (1, 2, 3)
-    assert np.array_equal(MODEL.corrected(measured_m), together[0, 0])
-    assert np.array_equal(MODEL.covariance(measured_m), MODEL.covariance([measured_m, measured_m])[1])
 
 
 def test_the_bias_is_that_of_the_true_position():
@@ -54,11 +46,8 @@ def test_covariance_is_the_spread_inside_and_grows_outside():
     assert (np.diag(near) > np.diag(MODEL.covariance([0, 0, 0.5]))).all()
 
 
-def test_distance_to_the_measured_range():
-    assert [MODEL.distance_outside(*each) for each in ((0, 2), (-1.7, 4.3), (0, 0.4))] == pytest.approx([0, 0.5, 0.1])
-
-
-def test_positions_behind_the_camera_are_rejected():
+def test_only_positions_before_the_camera_are_corrected_and_stay_there():
+    assert MODEL._replace(z_bias=(0.3,)).corrected([[0.0, 0.2, 0.1]])[0, 2] > 0
     with pytest.raises(ValueError, match='z is -1 m'):
         MODEL.corrected([[0, 0, 1], [0, 0, -1]])
 
@@ -67,34 +56,21 @@ def test_positions_behind_the_camera_are_rejected():
     ({'z_bias': (-0.2, 0.0, 0.0)}, 'z_bias changes by 1.6 m a metre'),
     ({'x_bias': XBias(0.1, -2.0, 0.0)}, 'x_bias changes by 1.9 m'),
     ({'z_bias': (0.0, 0.9)}, 'z_bias is 0.9 m'),
-    ({'z_sigma': Spread(0.0, 0.0, 0.0)}, 'z_sigma'), ({'z_sigma': Spread(-0.5, 0.0, 0.0)}, 'z_sigma'),
-    ({'z_sigma': Spread(0.1, -1.0, 0.0)}, 'z_sigma'), ({'x_sigma': Spread(0.1, 0.0, -0.1)}, 'x_sigma'),
-    ({'y_sigma_m': -1.0}, 'y_sigma_m is -1'),
-    ({'growth_outside': -0.1}, 'growth_outside is -0.1'),
+    ({'z_sigma': Spread(0.0, 0.0, 0.0)}, 'z_sigma'), ({'x_sigma': Spread(0.1, 0.0, -0.1)}, 'x_sigma'),
+    ({'y_sigma_m': -1.0}, 'y_sigma_m is -1'), ({'growth_outside': -0.1}, 'growth_outside is -0.1'),
     ({'measured_range': MODEL.measured_range._replace(z_max_m=0.1)}, r'measured_range is \(0.5, 0.1')])
 def test_unusable_models_are_rejected(change, reason):
     with pytest.raises(ValueError, match=reason):
         checked(MODEL._replace(**change))
 
 
-def test_the_steepest_bias_is_corrected():
-    model = checked(MODEL._replace(z_bias=(STEEPEST_BIAS, 0.1)))
-    assert model.corrected(model.biased([0.3, 0.1, 3.0])) == pytest.approx([0.3, 0.1, 3.0], abs=1e-5)
-
-
 @settings(max_examples=30)
-@given(models, st.one_of(st.none(), st.builds(Scores, *[st.floats(0, 1)] * 5)))
-def test_models_survive_a_file(tmp_path_factory, model, scores):
+@given(models, st.one_of(st.none(), st.builds(Scores, *[st.floats(0, 1)] * 5)), st.sampled_from([None, 20.0]))
+def test_models_survive_a_file(tmp_path_factory, model, scores, range_m):
     path = str(tmp_path_factory.getbasetemp() / 'model.yaml')
-    write_error_model(path, model._replace(cross_validated=scores))
-    assert read_error_model(path) == model._replace(cross_validated=scores)
-
-
-@pytest.mark.parametrize('range_m', [None, 20.0])
-def test_the_detector_survives_a_file(tmp_path, range_m):
-    model = MODEL._replace(detector=DetectorModel(0.06, 1.2, 0.8, range_m))
-    write_error_model(tmp_path / 'model.yaml', model)
-    assert read_error_model(tmp_path / 'model.yaml') == model
+    model = model._replace(cross_validated=scores, detector=DetectorModel(0.06, 1.2, 0.8, range_m))
+    write_error_model(path, model)
+    assert read_error_model(path) == model
 
 
 @pytest.mark.parametrize('edit', [lambda content: content.pop('detector'),
@@ -115,24 +91,15 @@ def edited(folder, edit):
 
 @pytest.mark.parametrize('edit,reason', [
     (lambda content: content.update(z_bais=[1]), 'unknown key z_bais; did you mean z_bias'),
-    (lambda content: content['x_bias'].update(slop=1), r'unknown key x_bias\.slop; did you mean x_bias\.slope'),
-    (lambda content: content.pop('x_sigma'), 'the key x_sigma is missing'),
     (lambda content: content['x_sigma'].pop('growth'), r'the key x_sigma\.growth is missing'),
-    (lambda content: content.update(z_bias='1 + z'), "z_bias is '1 \\+ z'; a list of numbers expected"),
     (lambda content: content.update(z_bias=[]), r'z_bias is \[\]'),
     (lambda content: content.update(z_bias=[1, 'two']), "z_bias is 'two'; a number expected"),
     (lambda content: content.update(y_sigma_m=float('nan')), 'y_sigma_m is nan; a number expected'),
-    (lambda content: content.update(y_sigma_m=True), 'y_sigma_m is True'),
     (lambda content: content.update(x_sigma=3), 'x_sigma is 3; the keys constant_m, growth, near_m2 expected'),
-    (lambda content: content.update(y_sigma_m=0), 'y_sigma_m is 0; more than 0'),
-    (lambda content: content['detector'].update(max_rang_m=9), r'unknown key detector\.max_rang_m; did you mean '
-     r'detector\.max_range_m'),
     (lambda content: content['detector'].update(max_range_m=-1), r'detector\.max_range_m is -1; more than 0, or null'),
-    (lambda content: content['detector'].update(max_range_m='far'), "detector.max_range_m is 'far'; a number expected"),
     (lambda content: content['detector'].update(detection_probability=1), r'detection_probability is 1; more than 0'),
     (lambda content: content['detector'].update(lasting_sigma_m=-0.1), r'lasting_sigma_m is -0\.1; 0 to 10 expected'),
-    (lambda content: content['detector'].update(correlation_time_s=1e9), 'correlation_time_s is 1e'),
-    (lambda content: content.update(detector=8), 'detector is 8; the keys lasting_sigma_m')])
+    (lambda content: content['detector'].update(correlation_time_s=1e9), 'correlation_time_s is 1e')])
 def test_invalid_files_are_rejected(tmp_path, edit, reason):
     path = edited(tmp_path, edit)
     with pytest.raises(ValueError, match=reason) as error:
@@ -147,33 +114,12 @@ def test_files_without_a_model_are_rejected(tmp_path, text):
         read_error_model(tmp_path / 'model.yaml')
 
 
-def test_integers_are_accepted(tmp_path):
-    path = edited(tmp_path, lambda content: content.update(z_bias=[0], growth_outside=1))
-    assert read_error_model(path).z_bias == (0,)
-
-
-@pytest.mark.parametrize('path', sorted(glob.glob(os.path.join(SHIPPED, '*.yaml'))), ids=os.path.basename)
-def test_shipped_models_are_readable_and_documented(path):
-    assert read_error_model(path).provenance.source
-    with open(os.path.join(SHIPPED, 'README.md')) as stream:
-        text = stream.read()
-    assert '`%s`' % os.path.basename(path) in text and all('`%s`' % name in text for name in MODEL._fields)
-
-
-def test_the_thesis_model_is_the_published_one():
+def test_shipped_models_are_readable_and_the_thesis_one_is_published():
+    for path in glob.glob(os.path.join(SHIPPED, '*.yaml')):
+        assert read_error_model(path).provenance.source
     model = read_error_model(os.path.join(SHIPPED, 'thesis.yaml'))
     assert model.z_bias == (-0.04, 0.06, 0.008) and model.x_bias == (-0.106, 0.0, -0.006)
     assert np.sqrt(np.diag(model.covariance([0.5, 0, 2])))[[0, 2]] == pytest.approx([0.018, 0.0474])
-
-
-@pytest.mark.parametrize('estimator', ['', 'recorded', 'foreground'])
-def test_a_model_of_recorded_positions_is_for_any_estimator(estimator):
-    MODEL._replace(provenance=MODEL.provenance._replace(estimator=estimator)).check_estimator('foreground')
-
-
-def test_corrected_positions_are_in_front_of_the_camera():
-    corrected_m = MODEL._replace(z_bias=(0.3,)).corrected([[0.0, 0.2, 0.1]])
-    assert corrected_m[0, 2] > 0 and corrected_m[0, 1] > 0
 
 
 def test_boxes_are_corrected_and_get_their_covariance():

@@ -1,4 +1,4 @@
-"""Scenarios as worlds of Gazebo, and true tracks from its model states, without Gazebo."""
+"""People of scenarios as actors of Gazebo, and true tracks from its model states, without Gazebo."""
 import xml.etree.ElementTree as ElementTree
 from types import SimpleNamespace
 
@@ -40,17 +40,6 @@ def test_people_follow_the_motion_of_the_scenario(world):
             state, pose = motion.at(times_s[-1]), numbers(waypoint, 'pose')
             np.testing.assert_allclose(pose, [*state.position_m, 0, 0, 0, state.heading_rad], atol=1e-3)
         assert times_s[0] == 0 and times_s[-1] >= SCENARIO.duration and (np.diff(times_s) > 0).all()
-
-
-def test_the_room_has_walls_and_its_furniture_on_the_floor(world):
-    link = world.find("model[@name='room']/link")
-    boxes = [(numbers(shape, 'pose'), numbers(shape, 'geometry/box/size')) for shape in link.findall('collision')]
-    assert boxes == [(numbers(shape, 'pose'), numbers(shape, 'geometry/box/size')) for shape in link.findall('visual')]
-    inner_faces = sorted((pose[axis] - np.sign(pose[axis] - center) * size[axis] / 2) for axis, center, numbered in (
-        (0, 3.5, boxes[1:3]), (1, 0, boxes[3:5])) for pose, size in numbered)
-    np.testing.assert_allclose(inner_faces, [-3, -1, 3, 8])
-    assert boxes[0][0][2] + boxes[0][1][2] / 2 == 0  # the floor
-    assert boxes[5] == ([4, 1, 0.85, 0, 0, 0.3], [0.5, 0.4, 1.7])
 
 
 def states(paths, times_s):

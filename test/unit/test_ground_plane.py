@@ -7,6 +7,7 @@ from ros_3d_bb.camera.camera_model import Camera, transform_points
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.detection.depth.ground_plane import MAX_HIGHER, FittedFloor, Floor, fit_floor, floor_from_transform
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
+from support.cylinders import mounted
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 V, U = np.mgrid[:CAMERA.height, :CAMERA.width]
@@ -75,15 +76,9 @@ def test_the_result_is_none_without_a_floor():
         assert fit_floor(DepthImage(depth_m, 1.0), CAMERA) is None
 
 
-@given(st.floats(-0.4, 0.4), st.floats(-0.4, 0.4), st.floats(0.2, 2))
-def test_heights_agree_with_the_transform(pitch, yaw, height_m):
-    """base_link has x forward, y left, z up; the camera is pitched and turned."""
-    turned = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
-    pitched = np.array([[np.cos(pitch), 0, np.sin(pitch)], [0, 1, 0], [-np.sin(pitch), 0, np.cos(pitch)]])
-    optical = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]])
-    camera_from_base = np.eye(4)
-    camera_from_base[:3, :3] = optical.dot((turned.dot(pitched)).T)
-    camera_from_base[:3, 3] = -camera_from_base[:3, :3].dot([0.1, -0.2, height_m])
+@given(st.floats(-20, 20), st.floats(-20, 20), st.floats(0.2, 2))
+def test_heights_agree_with_the_transform(pitch_deg, yaw_deg, height_m):
+    camera_from_base = np.linalg.inv(mounted(height_m, pitch_deg, yaw_deg=yaw_deg))
     floor = floor_from_transform(camera_from_base)
     points = np.array([[2, 1, 0], [3, -1, 1.7], [1, 0, -0.4]])
     np.testing.assert_allclose(floor.height(transform_points(camera_from_base, points)), points[:, 2], atol=1e-9)

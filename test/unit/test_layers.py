@@ -165,17 +165,6 @@ def test_no_file_imports_one_that_imports_it(root, package):
     assert len(below) > 5 and cycles_in(below) == []
 
 
-def test_nodes_import_no_mathematics_and_no_other_node():
-    """people_node runs others in its process."""
-    nodes = [module for module in MODULES if module.endswith('_node')]
-    for module in MODULES:
-        if lies_in(module, 'ros_3d_bb.nodes') or module in nodes:
-            libraries, ours = imports_of(module)
-            assert not libraries & {'numpy', 'math'}, module
-            others = [node for node in nodes if node != module and module != 'ros_3d_bb.nodes.people_node']
-            assert not any(lies_in(name, node) for name in ours for node in others), module
-
-
 def test_the_annotator_imports_no_ros_and_the_noise_analysis_in_one_module():
     """The noise analysis takes a second to import."""
     with_ros = 'ros_3d_bb.nodes', 'ros_3d_bb.msg', 'ros_3d_bb.conversions'

@@ -1,15 +1,10 @@
-"""Benchmark of navigation: its scenes and sensors, the pace of the simulated time, the map, and the summary of trials.
-"""
-from collections import namedtuple
-
-import numpy as np
+"""Benchmark of navigation: its scenes, the pace of the simulated time, and the summary of trials."""
 import pytest
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
 from ros_3d_bb_lab.evaluation.navigation.navigation_scenes import DURATION_S, SCENES, scenario_of
-from ros_3d_bb_lab.evaluation.navigation.trial_result import CELL_M, Pace, VisiblePeople, occupancy, summary
-from ros_3d_bb_lab.simulation.scenario import Furniture, Room, scenario_from
+from ros_3d_bb_lab.evaluation.navigation.trial_result import Pace, summary
+from ros_3d_bb_lab.simulation.scenario import scenario_from
 
 LEAD_NS = int(Pace.LEAD_S * NS)
 
@@ -42,28 +37,8 @@ def test_time_waits_for_the_slowest_source():
     assert pace.late == 0
 
 
-def test_the_map_has_walls_and_furniture():
-    room = Room(bounds=(-1.0, 3.0, -2.0, 2.0), furniture=(Furniture((2.0, 1.0), (1.0, .5, 2.0)),))
-    cells = occupancy(room)
-    assert cells.shape == (4.0 / CELL_M, 4.0 / CELL_M) and set(np.unique(cells)) == {0, 100}
-
-    def at(x, y):
-        return cells[int((y + 2) / CELL_M), int((x + 1) / CELL_M)]
-
-    assert [at(*place) for place in ((2, 1), (1.6, .85), (1.4, 1), (2, .6), (0, 0), (-.99, 0), (0, 1.99))] == [
-        100, 100, 0, 0, 0, 100, 100]
-
-
 def test_the_summary_of_trials():
     trials = [trial(), trial(collisions=2, collisions_driving=1, time_to_goal_s=None, min_distance_m=-.1, stops=3)]
     assert summary(trials) == {'runs': 2, 'collisions': 2, 'collisions_driving': 1, 'runs_with_collisions': 1,
                                'reached': 1, 'time_to_goal_s': 10.0, 'min_distance_m': -.1, 'stops': 1.5}
     assert summary(trials[1:])['time_to_goal_s'] is None
-
-
-def test_people_are_visible_in_the_newest_image_of_any_camera():
-    Track = namedtuple('Track', 'id status')
-    visible = VisiblePeople(cameras=2)
-    images = (VISIBLE, OUT_OF_VIEW), (OUT_OF_VIEW, VISIBLE), (OCCLUDED, VISIBLE), (VISIBLE, OCCLUDED)
-    shown = [[track.id for track in visible.of([Track(1, one), Track(2, other)])] for one, other in images]
-    assert shown == [[1], [1, 2], [2], [1, 2]]

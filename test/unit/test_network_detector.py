@@ -3,10 +3,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.detection.batches import BGR, batch_of
 from ros_3d_bb.detection.boxes import Detections, iou, non_maximum_suppression
-from ros_3d_bb.detection.network_detector import (DetectionParams, NetworkDetector, Resize, class_number, fit_image,
-                                                  ranked)
+from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetector, Resize, fit_image, ranked
 from ros_3d_bb.detection.yolov5.backends import open_runtime
 from ros_3d_bb.detection.yolov5.predictions import Backend
 from ros_3d_bb.sessions.session_reader import read_color, read_session
@@ -50,13 +48,6 @@ def test_images_are_placed_as_the_network_was_trained(mode, columns, padding):
     assert set(np.unique(outside)) == (set() if padding is None else {padding})
 
 
-def test_channels_are_reordered_before_mean_and_scale_are_applied():
-    image = np.full((2, 2, 3), (10, 20, 30), np.uint8)
-    batch = batch_of(image[:, ::-1], BGR, (3, 2, 1), (9, 6, 3), np.float16)
-    assert batch.dtype == np.float16
-    np.testing.assert_allclose(batch[0, :, 0, 0], (3, 3, 3))
-
-
 def test_boxes_are_in_image_pixels_and_clipped_to_the_image():
     runtime = FixedRuntime([(320, 320, 320, 160, 0.9, 1, 0), (0, 320, 100, 100, 0.8, 1, 0)])
     image = np.zeros((360, 1280, 3), np.uint8)[..., ::-1]  # a view, as of a bgr8 image
@@ -94,8 +85,3 @@ def test_suppression_agrees_with_a_naive_implementation(count, limit, max_det, s
                             np.sort(random.random_sample(count))[::-1], random.randint(0, 2, count))
     kept = non_maximum_suppression(detections, limit, max_det)
     np.testing.assert_array_equal(kept.boxes, detections.boxes[naive_suppression(detections, limit, max_det)])
-
-
-@pytest.mark.parametrize('entry,number', [('cat', 1), (1, 1), ('1', 1), ('person', 0)])
-def test_classes_by_name_and_number(entry, number):
-    assert class_number(entry, ['person', 'cat']) == number

@@ -9,12 +9,10 @@ import numpy as np
 import onnx
 import pytest
 
-from ros_3d_bb.detection.weights import WeightsError
 from ros_3d_bb.detection.yolov5 import onnx_backend, onnx_export
-from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime
 from ros_3d_bb.detection.yolov5.onnx_backend import open_exported, with_checksum
-from ros_3d_bb.detection.yolov5.onnx_export import Exporter, export
-from support.checkpoints import random_network, write_checkpoint
+from ros_3d_bb.detection.yolov5.onnx_export import export
+from support.checkpoints import write_checkpoint
 from support.layouts import layout
 
 SOURCE = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(onnx_backend.__file__))))
@@ -73,10 +71,7 @@ def with_other_weights(content):
 
 
 @pytest.mark.parametrize('damage, cause', [
-    (lambda content: content[:-1000], 'checksum'), (lambda content: b'', 'checksum'),
-    (lambda content: content[:5000] + bytes([content[5000] ^ 1]) + content[5001:], 'checksum'),
-    (lambda content: content[:-1] + b'x', 'checksum'), (lambda content: with_checksum(b'nonsense'), 'cannot run'),
-    (lambda content: with_checksum(Exporter().model(random_network(layout('6.0', 'n', 3)).fuse(), {})), 'cannot run'),
+    (lambda content: content[:-1000], 'checksum'), (lambda content: with_checksum(b'nonsense'), 'cannot run'),
     # for example with a faulty release of ONNX Runtime
     (lambda content: with_checksum(with_other_weights(content)), 'torch')])
 def test_a_file_that_cannot_be_trusted_is_exported_again(cache, damage, cause):
@@ -93,15 +88,6 @@ def test_a_full_disk_causes_a_warning_only(cache, monkeypatch):
     monkeypatch.setattr(onnx_backend.os, 'replace', mock.Mock(side_effect=OSError('no space left')))
     assert rows_of(cache.open()).shape[1] == 8
     assert len(cache.warnings) == 1 and list(cache.folder.iterdir()) == []
-
-
-@pytest.mark.parametrize('name, named', [
-    ('missing.pt', 'missing.pt: .*No such file'), ('damaged.pt', 'damaged.pt.*zip'), ('.', 'Is a directory')])
-def test_checkpoints_that_cannot_be_read_are_rejected(tmp_path, name, named):
-    (tmp_path / 'damaged.pt').write_bytes(b'nonsense')
-    with pytest.raises(WeightsError, match=named):
-        open_runtime(tmp_path / name, RuntimeParams(device='cpu', export_folder=str(tmp_path / 'made')))
-    assert not (tmp_path / 'made').exists()
 
 
 def test_exports_are_valid_onnx(cache):

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import pytest
 
-from ros_3d_bb.core.params import SET_BY_LAUNCH, Param, params_from, parameters, table_of
+from ros_3d_bb.core.params import Param, params_from, parameters
 
 
 RATE = Param(30.0, 'Rate of the images.', 'Hz', limits=(0.5, 60), live=(1, 60), section='both')
@@ -55,18 +55,3 @@ def test_values_that_are_not_allowed_are_rejected(given):
     (name, _value), = given.items()
     with pytest.raises(ValueError, match='parameter ~%s ' % name):
         params_from(given, Camera, Filter)
-
-
-def test_a_table_has_a_row_for_each_name_with_its_section():
-    table = table_of([Camera, Filter])
-    assert [(name, param.section) for name, param in table.items()] == [
-        ('rate', 'both'), ('frame', SET_BY_LAUNCH), ('enabled', ''), ('color', ''), ('stride', 'sampling'),
-        ('classes', 'filter'), ('shapes', 'filter')]
-
-
-@pytest.mark.parametrize('param, facts', [
-    (Param(True, 'Text.'), ''), (Param(1.0, 'Text.', 'm'), 'Unit: m.'),
-    (RATE, 'Unit: Hz. Allowed: 0.5 to 60. Live: 1 to 60.'), (Param(1, 'Text.', limits=(1, 1e6)), 'Allowed: 1 or more.'),
-    (Param('a', 'Text.', choices=('a', 'b'), live=True), 'Allowed: one of a, b. Live.')])
-def test_facts_complete_the_text(param, facts):
-    assert param.facts == facts

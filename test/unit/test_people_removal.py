@@ -11,7 +11,7 @@ CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
 MARGIN_M = 0.2
 
 
-def test_cylinders_are_where_people_are_then_and_wider_if_that_is_uncertain():
+def test_cylinders_are_where_people_are_then_and_wider_if_uncertain():
     walking = track_at([2, 1, 0.85], [1.0, 0, 0], covariance=np.diag([0.01, 0.04, 0, 0, 0, 0]))
     walking = walking._replace(prediction_covariance_m2=np.tile(walking.covariance[:3, :3], (8, 1, 1)))
     dog = track_at([0, 0, 0.3], [0, 0, 0])._replace(label='dog')
@@ -21,7 +21,7 @@ def test_cylinders_are_where_people_are_then_and_wider_if_that_is_uncertain():
     assert cylinders_of([], 0.3, MARGIN_M).shape == (0, 5)
 
 
-def test_beams_that_end_at_a_person_are_found_and_those_beside_and_behind_are_not():
+def test_beams_that_end_at_a_person_are_found_and_others_are_not():
     ranges_m = np.array([2.0, 1.8, 4.0, np.inf, np.nan, 2.0])
     points_m = scan_points(ranges_m, -0.2, 0.1) + [0, 0, 0.3]
     found = are_inside(points_m, cylinders_of([track_at([2, 0, 0.85], [0, 0, 0])], 0.0, MARGIN_M))

@@ -25,16 +25,6 @@ def test_a_change_of_frame_turns_velocity_and_covariance(yaw, x, y):
     assert along.dot(again.covariance[3:, 3:]).dot(along) == pytest.approx(0.1)
 
 
-def test_footprints_fill_the_cylinder_and_the_ground_ahead_without_gaps():
-    """1.5 m/s along x for 1 s: a strip of 0.5 m width, 1.5 m longer than the body."""
-    points = footprint_points([track_at([2, 0, 0.85], [1.5, 0, 0])], 1.0, 0.05)
-    assert points[:, 0].min() == pytest.approx(1.75) and points[:, 0].max() == pytest.approx(3.75)
-    assert np.abs(points[:, 1]).max() == pytest.approx(0.25, abs=0.002)
-    assert sorted(set(np.round(points[:, 2], 3))) == [0.425, 0.85, 1.275]
-    strip = np.stack(np.meshgrid(np.arange(1.9, 3.6, 0.02), np.arange(-0.2, 0.2, 0.02)), axis=-1).reshape(-1, 1, 2)
-    assert np.linalg.norm(strip - points[np.newaxis, :, :2], axis=-1).min(axis=1).max() < 0.05
-
-
 def test_footprints_end_where_the_prediction_is_uncertain():
     """The standard deviation grows from 0.3 m now to 0.6 m after 0.5 s: 0.5 m after 0.33 s."""
     track = track_at([2, 0, 0.85], [1.5, 0, 0], covariance=0.3 ** 2 * np.eye(6))._replace(
@@ -111,11 +101,6 @@ def segment_distances(points, start, end):
     return np.linalg.norm(points - start - share[:, None] * along, axis=1)
 
 
-def test_before_its_stamp_a_walking_person_is_on_the_way():
-    track = track_at([3, 1, 0.9], [1.0, -0.5, 0], moving=True)
-    np.testing.assert_allclose(position_after(track, -0.4), [2.6, 1.2, 0.9])
-
-
 def test_positions_become_less_certain_beyond_the_predictions():
     track = track_at([3, 1, 0.9], [0, 0, 0], covariance=0.01 * np.eye(6))
     track = track._replace(prediction_covariance_m2=(0.01 + 0.02 * np.arange(1, 9))[:, None, None] * np.eye(3))
@@ -129,7 +114,7 @@ def test_without_predictions_positions_become_less_certain_by_the_velocity():
 
 
 @pytest.mark.parametrize('heading', [0.0, np.pi / 4, np.pi / 2])
-def test_what_is_marked_of_a_walking_person_out_of_view_does_not_depend_on_the_heading(heading):
+def test_marks_of_a_person_out_of_view_do_not_depend_on_the_heading(heading):
     turn = upright(0, 0, 0, heading)[:3, :3]
     covariance = np.zeros((6, 6))
     covariance[:3, :3] = turn.dot(np.diag([0.23 ** 2, 0.1 ** 2, 0.01])).dot(turn.T)

@@ -1,9 +1,8 @@
-"""Plausibility of truth: slips are found, clean measurements are not questioned, and slips do not change the model."""
+"""Plausibility of truth: slips are found, and clean measurements are not questioned."""
 import numpy as np
 import pytest
 
-from ros_3d_bb.sessions.plausibility import FACTORS, LEAST_MEASUREMENTS, likely_errors
-from ros_3d_bb_lab.evaluation.noise.analysis import Inputs, analyse
+from ros_3d_bb.sessions.plausibility import FACTORS, likely_errors
 from ros_3d_bb_lab.evaluation.noise.tables import read_session_measurements
 
 SLIP_M = 0.3 + 1e-9  # larger slips must be found
@@ -46,57 +45,12 @@ def test_every_slip_of_more_than_0_3_m_is_found_and_no_true_position_is(table):
     assert count > 25 * len(truth_m)
 
 
-def twenty_slips(table):
-    """(number of the measurement, changed measured, changed truth): 4 of each kind."""
-    measured_m, truth_m = positions_of(table)
-    far = [number for number in range(len(truth_m)) if truth_m[number, 1] > 2 and abs(truth_m[number, 0]) > 0.3][::2]
-    marks_m = np.unique(truth_m, axis=0)
-    for place, number in enumerate(far[:20]):
-        true_m, kind = truth_m[number], place % 5
-        if kind == 3:  # the estimate is that of another person
-            other = measured_m[np.argmax(np.hypot(*(truth_m - true_m).T))]
-            yield number, other, true_m
-            continue
-        distances_m = np.hypot(*(marks_m - true_m).T)
-        next_m = marks_m[np.argmin(np.where(distances_m > SLIP_M, distances_m, np.inf))]
-        yield number, measured_m[number], (true_m * (1, 0.1), true_m * 1000, next_m, None, true_m * (-1, 1))[kind]
-
-
-def changed(table, slips):
-    table = table._replace(measured_m=table.measured_m.copy(), truth_m=table.truth_m.copy())
-    for number, measured_m, truth_m in slips:
-        table.measured_m[number, [0, 2]], table.truth_m[number] = measured_m, truth_m
-    return table
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('first', [0, 5, 10])
-def test_five_slips_that_are_left_in_do_not_change_the_model(table, first):
-    results = []
-    slips = list(twenty_slips(table))[first:first + 5]
-    for measurements in (table, changed(table, slips)):
-        analysis = analyse(Inputs.of_session(measurements, '', ''))
-        scores = analysis.model.cross_validated
-        results.append([analysis.z.max_sigma_m, analysis.x_variance.max_sigma_m, scores.rmse_x_m, scores.rmse_z_m,
-                        analysis.model.z_sigma.at(2.5), analysis.model.x_sigma.at(2.5)])
-    assert results[1] == pytest.approx(results[0], rel=0.2)
-    assert len(analysis.inputs.outliers) == 5
-
-
 def made(count, seed=0, noise_m=0.01):
     """Measured and true positions with the errors 0.1 - 0.05 z in z and -0.1 x in x."""
     random = np.random.RandomState(seed)
     truth_m = np.stack((random.uniform(-1, 1, count), random.uniform(1, 4, count)), axis=1)
     error_m = np.stack((-0.1 * truth_m[:, 0], 0.1 - 0.05 * truth_m[:, 1]), axis=1)
     return truth_m + error_m + noise_m * random.normal(size=truth_m.shape), truth_m
-
-
-def test_with_few_measurements_the_limit_is_0_3_m_or_15_percent():
-    likely = likely_errors(*made(LEAST_MEASUREMENTS - 1))
-    near_m, far_m = np.array([0.0, 1.0]), np.array([0.0, 4.0])
-    for measured_m, limit_m in ((near_m, 0.3), (far_m, 0.6)):
-        assert likely.are_plausible(measured_m, measured_m + (0, limit_m - 0.01))
-        assert not likely.are_plausible(measured_m, measured_m + (limit_m + 0.01, 0))
 
 
 @pytest.mark.parametrize('factors', [(1, 0.001), (0.001, 0.001), (1, 10), (0.01, 1), (-1, 1)])

@@ -6,8 +6,6 @@ from ros_3d_bb.camera.camera_model import Camera, transform_from
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.camera.image_rotation import turned_depth
 from ros_3d_bb.camera.registration import RegisteredDepth, Registration
-from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
-from support.cylinders import Cylinder, mounted, rect_of, render
 
 COLOR, DEPTH_CAMERA = Camera(640, 480, 614.686, 614.842, 319.199, 242.08), Camera(848, 480, 421.0, 421.0, 424.2, 238.9)
 WIDE = Camera(160, 120, 80.0, 80.0, 79.5, 59.5)
@@ -43,17 +41,6 @@ def test_registered_points_leave_no_gaps_and_hide_what_is_behind(zoom):
     assert (np.abs(unseen - near[0]) < 10 * zoom).all()
 
 
-def test_a_part_has_the_values_of_the_whole_image():
-    depth = registered(stripe(), COLOR, 0.05)
-    whole, part = depth.values, depth.part(slice(100, 300), slice(200, 400))
-    assert part.shape == (200, 200) and depth.shape == whole.shape == (480, 640)
-    agree = np.abs(part - whole[100:300, 200:400]) < 0.01  # the cells begin elsewhere
-    assert agree.mean() > 0.95
-    assert depth.part(slice(5, 5), slice(0, 9)).shape == (0, 9)
-    depth_m, measured = depth.at(np.array([320]), np.array([240]))
-    assert measured.all() and depth_m == whole[240, 320]
-
-
 @pytest.mark.parametrize('value', [0, np.nan, np.inf, -1, 1e4])
 def test_invalid_depth_is_not_registered(value):
     assert not registered(np.full((120, 160), value, np.float32), COLOR, 0.05).values.any()
@@ -76,14 +63,6 @@ def test_a_rotated_distorted_depth_camera_sees_the_same_points():
     assert np.abs(part - expected_m)[part > 0].max() < 0.02  # the slope of the wall within a pixel
 
 
-def test_the_area_with_depth_is_that_of_the_depth_camera():
-    narrow = Camera(160, 120, 160.0, 160.0, 79.5, 59.5)
-    assert registered(stripe(), COLOR, 0.0).measured_area() == (0, 0, 640, 480)
-    left, top, right, bottom = registered(stripe(), COLOR, 0.0, narrow).measured_area()
-    assert (left, right) == pytest.approx((319.2 - 614.7 * 79.5 / 160, 319.2 + 614.7 * 79.5 / 160), abs=2)
-    assert (top, bottom) == pytest.approx((242.1 - 614.8 * 59.5 / 160, 242.1 + 614.8 * 59.5 / 160), abs=2)
-
-
 def test_the_area_with_depth_is_turned_with_the_image():
     """The depth camera sees less than the colour camera: people at the border of the area are truncated."""
     depth = registered(stripe(), COLOR, 0.02, Camera(160, 120, 160.0, 160.0, 79.5, 59.5))
@@ -91,19 +70,3 @@ def test_the_area_with_depth_is_turned_with_the_image():
     assert 0 < left != 640 - right > 0
     assert turned_depth(depth, 1).measured_area() == (480 - bottom, left, 480 - top, right)
     assert turned_depth(depth, 2).measured_area() == (640 - right, 480 - bottom, 640 - left, 480 - top)
-
-
-@pytest.mark.parametrize('baseline_m', [0.015, 0.05])
-def test_boxes_have_the_position_of_aligned_depth(baseline_m):
-    view = mounted(1.0)
-    people = [Cylinder(2.0, 0.6), Cylinder(3.0, -0.5), Cylinder(5.0, 0.2)]
-    aligned, shown = render(COLOR, view, people)
-    raw, _shown = render(DEPTH_CAMERA, view.dot(transform_from((-baseline_m, 0, 0), (0, 0, 0, 1))), people)
-    rects = [rect_of(shown, number) for number in range(3)]
-    registration = Registration(COLOR, DEPTH_CAMERA, transform_from((-baseline_m, 0, 0), (0, 0, 0, 1)))
-    plain, lifted = (estimate_boxes(depth, rects, COLOR, estimator_named('foreground'))
-                     for depth in (aligned, RegisteredDepth(raw, registration)))
-    for expected, box in zip(plain, lifted):
-        np.testing.assert_allclose(box.center_m, expected.center_m, atol=0.01)
-        assert box.support == pytest.approx(expected.support, abs=0.05)
-        assert box.truncated_edges == expected.truncated_edges

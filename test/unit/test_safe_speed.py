@@ -6,13 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.planning.planner_view import position_after
 from ros_3d_bb.planning.safe_speed import SafeSpeedParams, highest_safe_speed, limited_velocity
-from ros_3d_bb.tracking.track import PredictionParams
-from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.types import CameraView, Detection
-from support.cylinders import mounted
 from support.tracks import track_at
 
 PARAMS = SafeSpeedParams(position_sigmas=0.0)
@@ -60,7 +55,7 @@ def test_at_a_safe_speed_the_robot_touches_nobody_who_walks_as_predicted(x, y, v
 
 @settings(deadline=None, max_examples=100)
 @given(st.floats(0, 2 * np.pi), st.floats(1, 4), st.floats(-1, 1), st.floats(-1, 1))
-def test_more_people_later_tracks_and_less_certain_positions_never_allow_more_speed(angle, distance_m, vx, vy):
+def test_more_people_and_less_certain_positions_never_allow_more_speed(angle, distance_m, vx, vy):
     first = track_at(distance_m * np.array([np.cos(angle), np.sin(angle), 0]), [vx, vy, 0],
                      covariance=np.diag([.02, .05, 0, 0, 0, 0]))
     first = first._replace(prediction_covariance_m2=np.tile(first.covariance[:3, :3], (8, 1, 1)))
@@ -76,7 +71,7 @@ def test_people_beside_and_behind_the_way_do_not_count():
     assert speed_among(track_at([1.5, 1.0, 0.9], [0, 0, 0]), velocity=(0.5, 0.0, 0.4)) < 1.3
 
 
-def test_a_person_who_will_cross_counts_only_if_the_robot_is_still_moving_then():
+def test_a_person_who_will_cross_counts_only_if_the_robot_moves_then():
     assert speed_among(track_at([0.9, 2.2, 0.9], [0, -1.0, 0])) < 1.4
     assert speed_among(track_at([0.9, 4.2, 0.9], [0, -1.0, 0])) == 2.0
 
@@ -94,34 +89,7 @@ def test_positions_are_those_of_now_in_the_frame_of_the_robot():
     assert speed_among(walking, age_s=1.0, robot_from_tracks=robot_from_tracks) == pytest.approx(now)
 
 
-@settings(deadline=None, max_examples=50)
-@given(st.floats(-np.pi, np.pi), st.floats(-1, 1))
-def test_all_directions_of_travel_are_equal(heading, rate):
-    def turned(x, y):
-        return x * np.cos(heading) - y * np.sin(heading), x * np.sin(heading) + y * np.cos(heading)
-    ahead = speed_among(track_at([1.6, 0.5, 0.9], [-0.3, 0, 0]), velocity=(0.8, 0, rate))
-    there = speed_among(track_at(turned(1.6, 0.5) + (0.9,), turned(-0.3, 0) + (0,)), velocity=turned(0.8, 0) + (rate,))
-    assert there == pytest.approx(ahead, abs=0.06)  # a step of the path
-
-
-def tracked_standing(prediction_time):
-    """The tracks after 4 s in which a person stands 3 m ahead."""
-    tracker, random = Tracker(prediction=PredictionParams(prediction_time=prediction_time)), np.random.RandomState(0)
-    for number in range(60):
-        position_m = random.normal((3.0, 0.0, 0.85), (0.03, 0.02, 0.0))
-        box = Detection(position_m, (0.5, 0.5, 1.7), np.diag([0.03 ** 2, 0.02 ** 2, 0.02 ** 2]))
-        tracks = tracker.update(NS + number * NS // 15, [box], CameraView(mounted(1.0)))
-    return tracks
-
-
-@pytest.mark.parametrize('prediction_time, more_mps', [(0.25, 0.03), (0.5, 0.03), (1.0, 0.03), (0.0, 0.15)])
-def test_shorter_predictions_of_the_tracker_hardly_allow_more_speed(prediction_time, more_mps):
-    usual_mps, short_mps = (speed_among(*tracked_standing(time_s), params=SafeSpeedParams())
-                            for time_s in (2.0, prediction_time))
-    assert usual_mps - 0.1 < short_mps < usual_mps + more_mps
-
-
-def test_people_farther_ahead_take_little_time_once_a_near_one_limits_the_speed():
+def test_people_behind_one_who_limits_the_speed_take_little_time():
     """Of a robot whose limit without people is as high as it can be set."""
     tracks = [track_at([3 + number, 0.2, 0.9], [0, 0, 0], number=number) for number in range(20)]
 

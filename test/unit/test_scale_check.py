@@ -39,11 +39,6 @@ def test_giants_count_with_any_support():
     assert [check.factor([box_of(8.5, support=0.15)]) for _ in range(LATEST)][-1] == 0.2
 
 
-def test_heights_that_disagree_are_no_fault():
-    check = ScaleCheck()
-    assert not any(check.factor([box_of(0.6), box_of(0.6), box_of(1.7)]) for _ in range(LATEST))
-
-
 def boxes_of(depth, rects_px, camera, level_from_camera=LEVEL):
     boxes = estimate_boxes(depth, rects_px, camera, estimator_named('foreground'), level_from_camera)
     return list(filter(None, boxes))

@@ -66,17 +66,12 @@ def test_rejected_measurements_are_skipped_even_if_invalid(folder):
 
 @pytest.mark.parametrize('edit,named', [
     (lambda content: content.pop('camera'), "'camera'"),
-    (lambda content: content['camera'].pop('fx'), "'fx'"),
     (lambda content: content['camera'].update(fx=0), 'intrinsics'),
-    (lambda content: content['camera'].update(distortion=[0.1, 0.2]), 'plumb_bob'),
-    (lambda content: content['camera'].update(width='wide'), 'wide'),
     (lambda content: content['camera'].update(depth_scale=-0.001), 'depth_scale is -0.001'),
     (lambda content: content['camera'].update(width=float('inf')), 'infinity'),
     (lambda content: content.update(frames=3), 'not iterable'),
     (lambda content: content['frames'][0].pop('depth'), "'depth'"),
-    (lambda content: content['frames'][0]['detections'][0].update(box=['a']), "'a'"),
     (lambda content: content['frames'][0]['detections'][0].update(box=[1, 2, 3]), '[1, 2, 3]'),
-    (lambda content: content['frames'][0]['detections'][0].update(box=[1, 2, 3, float('inf')]), '[1, 2, 3, inf]'),
     (lambda content: content['frames'].append(7), 'number 5')])
 def test_invalid_descriptions_are_rejected(folder, edit, named):
     change_json(folder, edit)

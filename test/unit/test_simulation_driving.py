@@ -1,11 +1,11 @@
-"""Differential drive and contact of the simulated robot: limits, arcs, and distances of rectangles."""
+"""Differential drive and contact of the simulated robot: limits, and distances of rectangles."""
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ros_3d_bb_lab.simulation.collision import Rectangle
-from ros_3d_bb_lab.simulation.driving import limited_velocity, measured_velocity, moved
+from ros_3d_bb_lab.simulation.driving import limited_velocity
 from ros_3d_bb_lab.simulation.scenario import Drive
 
 DRIVE = Drive(speed=1.0, rate=2.0, acceleration=0.5, angular_acceleration=4.0)
@@ -27,14 +27,6 @@ def test_velocity_approaches_the_wanted_one_within_the_limits(wanted, after_1_s,
     assert (np.abs(np.diff(velocities, axis=0)) <= np.array([.5, 4]) * .01 + 1e-12).all()
 
 
-def test_odometry_drifts_with_the_distance_and_the_angle():
-    velocity = np.array([1.0, -.5])
-    measured = measured_velocity(velocity, (.1, -.2))
-    np.testing.assert_allclose(measured, (1.1, -.4))
-    np.testing.assert_allclose(moved(np.zeros(3), measured_velocity(np.array([2.0, 0]), (.1, 0)), 1.0), (2.2, 0, 0))
-    np.testing.assert_array_equal(measured_velocity(np.zeros(2), (.1, .1)), (0, 0))
-
-
 @given(rectangles, coordinates, coordinates)
 @settings(max_examples=100)
 def test_the_distance_of_a_point_is_that_to_the_nearest_point(rectangle, x, y):
@@ -42,17 +34,3 @@ def test_the_distance_of_a_point_is_that_to_the_nearest_point(rectangle, x, y):
     nearest = rectangle.nearest_point((x, y))
     assert max(distance_m, 0) == pytest.approx(np.hypot(*(nearest - (x, y))), abs=1e-9)
     assert rectangle.signed_distances_m(nearest[None])[0] <= 1e-9
-
-
-@given(rectangles, rectangles)
-@settings(max_examples=200)
-def test_overlap_agrees_with_the_points_of_both(one, other):
-    grid = np.linspace(-.5, .5, 21)
-    cells = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2) * other.size
-    c, s = np.cos(other.yaw), np.sin(other.yaw)
-    distances_m = one.signed_distances_m(other.center + cells.dot([[c, s], [-s, c]]))
-    assert one.overlaps(other) == other.overlaps(one)
-    if distances_m.min() < -1e-6:
-        assert one.overlaps(other)
-    elif distances_m.min() > max(other.size) / 20:  # no corner lies between the points of the grid
-        assert not one.overlaps(other)

@@ -1,25 +1,10 @@
-"""Objects other than people in the simulator: shapes, motion, ground truth, and errors of estimated positions."""
+"""Objects other than people in the simulator, and their ground truth."""
 import numpy as np
 import pytest
 
-from ros_3d_bb_lab.simulation.motion import person_motion
-from ros_3d_bb_lab.simulation.scenario import Move, Person, SceneObject, Scenario
-from ros_3d_bb_lab.simulation.scene_objects import GAP_M, PushedMotion
+from ros_3d_bb_lab.simulation.scenario import Person, SceneObject, Scenario
+from ros_3d_bb_lab.simulation.scene_objects import GAP_M
 from ros_3d_bb_lab.simulation.simulator import Simulator
-
-
-def test_a_pushed_object_is_in_front_of_the_person():
-    moves = Move(to=(2.0, 0.0), speed=1.0), Move(to=(2.0, 2.0), speed=1.0)
-    person = person_motion(Person((0.0, 0.0), moves=moves), 1.7, 4)
-    pushed = PushedMotion(person, 0.7)
-    for time_s in (1.0, 2.0, 3.0):
-        position_m, _velocity, heading_rad, _posture = person.at(time_s)
-        ahead = np.array([np.cos(heading_rad), np.sin(heading_rad)])
-        np.testing.assert_allclose(pushed.at(time_s).position_m, position_m + 0.7 * ahead)
-        step_m = pushed.at(time_s + 0.05).position_m - pushed.at(time_s - 0.05).position_m
-        np.testing.assert_allclose(pushed.at(time_s).velocity_mps, step_m / 0.1, atol=0.1)
-    np.testing.assert_allclose(pushed.at(1.0).velocity_mps, (1, 0), atol=1e-6)
-    assert np.hypot(*pushed.at(2.0).velocity_mps) > 1.5  # it swings round
 
 
 def test_the_ground_truth_has_objects_after_people():

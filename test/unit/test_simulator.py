@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE
 from ros_3d_bb_lab.simulation.scenario import Furniture, Mount, Move, Person, Robot, Room, Scenario
-from ros_3d_bb_lab.simulation.simulator import PREDICTION_STEP_S, Simulator
+from ros_3d_bb_lab.simulation.simulator import Simulator
 
 CAMERA = Camera(160, 120, 153.7, 153.7, 79.8, 60.5)
 HALL = Room(furniture=(Furniture((3.0, 0.0), (.4, .8, 2.8)),))
@@ -99,20 +99,3 @@ def test_a_person_behind_a_pillar_is_occluded(pillar):
         person = frame.people[0]
         assert (value == OCCLUDED) == (person.hidden > .75)
         assert person.visible == pytest.approx(1 - person.hidden, abs=.01)  # completely inside the image
-
-
-def test_true_tracks_agree_with_the_frame_and_the_future_positions(pillar):
-    simulator, frames = pillar
-    frame = frames[6]
-    track, = simulator.true_tracks(frame, START_NS)
-    person = frame.people[0]
-    assert track.id == person.id == 1 and track.moving
-    np.testing.assert_array_equal(track.position_m, person.position_m)
-    np.testing.assert_array_equal(track.size_m, person.size_m)
-    np.testing.assert_allclose(track.velocity_mps, (0, -1, 0), atol=1e-9)
-    np.testing.assert_array_equal(track.velocity_mps, track.instant_velocity_mps)
-    assert (track.first_seen_ns, track.last_seen_ns) == (START_NS - 1200000000, START_NS)
-    assert track.prediction_step_s == PREDICTION_STEP_S and len(track.prediction_m) * PREDICTION_STEP_S == 2.0
-    for step, predicted_m in enumerate(track.prediction_m, 1):
-        positions_m = simulator.positions_at(frame.time_s + step * PREDICTION_STEP_S)
-        np.testing.assert_allclose(predicted_m[:2], positions_m[0])

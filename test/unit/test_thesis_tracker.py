@@ -4,7 +4,7 @@ import pytest
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker, ThesisTrackerParams
-from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, Detection
+from ros_3d_bb.tracking.types import OCCLUDED, Detection
 
 SIZE = np.array([0.5, 0.5, 1.7])
 
@@ -47,14 +47,6 @@ def test_velocity_is_averaged_with_alpha():
     np.testing.assert_allclose(track.instant_velocity_mps, 0)
 
 
-def test_prediction_is_straight_on_for_two_seconds():
-    tracker = ThesisTracker(ThesisTrackerParams(alpha=1.0))
-    tracker.update(0, [at(0, 0)])
-    track, = tracker.update(seconds(1), [at(0.5, 1)])
-    assert track.prediction_m.shape == (8, 3) and track.prediction_step_s == 0.25
-    np.testing.assert_allclose(track.prediction_m[[3, 7]], [(1.0, 2.0, 0.9), (1.5, 3.0, 0.9)])
-
-
 @pytest.mark.parametrize('rate_hz', [5, 30])
 def test_an_undetected_object_is_deleted_after_the_limit_in_seconds(rate_hz):
     tracker = ThesisTracker(ThesisTrackerParams(disappearance_limit=1.0))
@@ -63,15 +55,6 @@ def test_an_undetected_object_is_deleted_after_the_limit_in_seconds(rate_hz):
         track, = tracker.update(seconds(frame / rate_hz), [])
         assert track.status == OCCLUDED and track.position_m.tolist() == [1, 2, 0.9] and track.last_seen_ns == 0
     assert tracker.update(seconds(1 + 1 / rate_hz), []) == []
-
-
-def test_an_object_detected_again_in_time_keeps_its_id_and_velocity():
-    tracker = ThesisTracker(ThesisTrackerParams(alpha=1.0))
-    tracker.update(0, [at(0, 0)])
-    tracker.update(seconds(0.5), [])
-    track, = tracker.update(seconds(0.9), [at(0.9, 0)])
-    assert track.id == 1 and track.status == VISIBLE and track.first_seen_ns == 0
-    np.testing.assert_allclose(track.velocity_mps, [1, 0, 0])
 
 
 def test_tracks_do_not_age_during_skipped_images():

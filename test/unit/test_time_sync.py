@@ -2,7 +2,7 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.core.time_sync import NS, MessageCache, StampSynchronizer
+from ros_3d_bb.core.time_sync import NS, StampSynchronizer
 
 MS = NS // 1000
 PERIOD = 33 * MS
@@ -172,20 +172,6 @@ def test_all_boxes_are_matched_or_lost_for_any_messages(events):
     assert len(recorder.frames) + len(recorder.dropped) == sent
 
 
-@given(st.lists(st.integers(0, 5 * NS), min_size=1, max_size=50))
-def test_the_cache_is_ordered_and_not_longer_than_its_length(stamps):
-    cache = MessageCache(NS)
-    for stamp_ns in stamps:
-        newest_ns = cache.newest_ns
-        assert cache.add(stamp_ns, 0, stamp_ns) == (newest_ns is not None and stamp_ns < newest_ns)
-        kept = [entry.stamp_ns for entry in cache._entries]
-        assert kept == sorted(kept) and kept[-1] - kept[0] <= NS and cache.nearest(stamp_ns).value == stamp_ns
-
-
-def held_by(sync):
-    return len(sync._depths), len(sync._cameras), len(sync._waiting)
-
-
 @pytest.mark.parametrize('kind', ['depth', 'camera', 'boxes'])
 def test_one_stamp_from_the_future_loses_only_images_in_the_detector(kind):
     """An hour ahead, while the detector takes 0.2 s: at most these six images and the wrong one are lost."""
@@ -199,13 +185,3 @@ def test_one_stamp_from_the_future_loses_only_images_in_the_detector(kind):
     lost = set(range(114)) - set(answered)
     expected = {'depth': set(range(54, 61)), 'camera': set(), 'boxes': {60}}
     assert lost == expected[kind]
-
-
-def test_a_camera_without_a_stamp_is_used_for_all_images():
-    recorder = Recorder()
-    for number in range(1000):
-        assert recorder.add('camera', None, number, 'plain') == []
-    assert recorder.sync.has_camera and held_by(recorder.sync) == (0, 0, 0)
-    for stamp_ns in (PERIOD, 3600 * NS, 2 * PERIOD):  # the last is after a jump back in time
-        recorder.add('depth', stamp_ns, 0, 'depth')
-        assert recorder.add('boxes', stamp_ns, 0, 'boxes') == [('boxes', 'depth', 'plain')]

@@ -32,12 +32,6 @@ def test_a_track_has_the_class_of_its_detections(kind):
 
 
 @pytest.mark.parametrize('kind', TRACKERS)
-def test_detections_without_class_are_people_of_unknown_score(kind):
-    track, = play(kind(), [[at(3, 0)]] * 10)[-1]
-    assert (track.label, track.score) == ('person', 0.0)
-
-
-@pytest.mark.parametrize('kind', TRACKERS)
 def test_tracks_never_change_between_groups(kind):
     """A person walks past a chair and stops in its place."""
     images = [[at(3, 0.04 * number - 1.2, 'person'), at(3, 0, 'chair')] for number in range(30)]
@@ -65,27 +59,6 @@ def test_the_label_is_the_most_probable_class_of_the_group():
     assert play(Tracker(), higher_score)[-1][0].label == 'cat'
 
 
-def test_classes_without_scores_count_equally():
-    published = play(Tracker(), [[at(3, 0, 'couch' if number % 3 else 'chair')] for number in range(30)])
-    assert (published[-1][0].label, published[-1][0].score) == ('couch', 0.0)
-
-
-def test_the_score_is_the_mean_and_then_a_first_order_filter():
-    scores = np.random.RandomState(0).uniform(0.3, 0.9, 30)
-    published = play(Tracker(), [[at(3, 0, 'dog', score)] for score in scores])
-    assert published[7][0].score == pytest.approx(scores[:8].mean())
-    expected = scores[:10].mean()
-    for score in scores[10:]:
-        expected += 0.1 * (score - expected)
-    assert published[-1][0].score == pytest.approx(expected)
-
-
-def test_unknown_scores_leave_the_score_as_it_is():
-    published = play(Tracker(), [[at(3, 0, score=0.0 if number % 2 else 0.8)] for number in range(20)])
-    assert published[-1][0].score == pytest.approx(0.8)
-    assert play(Tracker(), [[at(3, 0, score=0.6 if number > 15 else 0.0)] for number in range(20)])[-1][0].score == 0.6
-
-
 @pytest.mark.parametrize('kind', TRACKERS)
 def test_a_track_that_was_not_detected_has_no_detection(kind):
     tracker = kind()
@@ -99,11 +72,6 @@ def test_the_detection_is_that_of_the_newest_image_after_a_late_one():
     tracker.update(11 * NS // 30, [at(3, 0, index=3)], VIEW)
     track, = tracker.update(10 * NS // 30, [at(3, 0, index=5)], VIEW)
     assert (track.detection, track.status) == (3, VISIBLE)
-
-
-def test_classes_that_are_not_listed_are_groups_of_their_own():
-    tracks = play(Tracker(), [[at(3, 0, 'drone'), at(3, 0.1, 'pet'), at(3, 0.2, 'dog')]] * 10)[-1]
-    assert [track.label for track in tracks] == ['drone', 'pet', 'dog']
 
 
 def test_class_names_that_are_not_listed_are_not_kept():

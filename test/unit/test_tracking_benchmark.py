@@ -1,4 +1,4 @@
-"""The trackers of the benchmark, and the command."""
+"""The runs and trackers of the benchmark, and the command."""
 import json
 import sys
 
@@ -7,10 +7,9 @@ import pytest
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
-from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, Detection
-from ros_3d_bb_lab.evaluation.baselines.norfair_baseline import Norfair
+from ros_3d_bb.tracking.types import Detection
 from ros_3d_bb_lab.evaluation.baselines.oracle_association import outputs_with_perfect_association
-from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker, as_it_arrived
+from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker
 from ros_3d_bb_lab.evaluation.tracking import benchmark
 from ros_3d_bb_lab.evaluation.tracking.benchmark import outputs_of
 from ros_3d_bb_lab.evaluation.tracking.detection_generator import DOUBLE, FALSE
@@ -32,26 +31,6 @@ def stamp(number):
     return number * NS // 30
 
 
-def follow(tracker, count, places_of):
-    """Tracks after each of `count` images, with detections at `places_of(seconds)`."""
-    return [tracker.update(stamp(number + 1), at(*places_of(number / 30.0)), None) for number in range(count)]
-
-
-@pytest.mark.needs('norfair')
-def test_norfair_tracks_a_walking_person_in_seconds_and_metres():
-    tracker = Norfair()
-    outputs = follow(tracker, 60, lambda time_s: [(1 + 1.2 * time_s, 2 - 0.5 * time_s)])
-    person, = outputs[-1]
-    assert set(thing.id for things in outputs for thing in things) == {person.id} and person.status == VISIBLE
-    assert np.allclose(person.velocity_mps, (1.2, -0.5, 0), atol=0.02)
-    assert np.allclose(person.prediction_m[-1, :2], (1 + 1.2 * (59 / 30.0 + 2), 2 - 0.5 * (59 / 30.0 + 2)), atol=0.1)
-    assert (person.size_m[2], person.position_m[2]) == (1.7, 0.9) and person.covariance is None
-    assert 0 < person.first_seen_ns < person.last_seen_ns == stamp(60)
-    undetected = [tracker.update(stamp(number), [], None) for number in range(61, 122)]
-    assert undetected[0][0].status == OCCLUDED and undetected[0][0].last_seen_ns == stamp(60)
-    assert undetected[-1] == []
-
-
 def test_the_velocity_of_the_original_is_a_step_times_the_rate():
     tracker = OriginalTracker()
     tracker.update(stamp(1), at((1.0, 0.0)))
@@ -60,25 +39,14 @@ def test_the_velocity_of_the_original_is_a_step_times_the_rate():
     assert person.prediction_m[-1, 0] == pytest.approx(1.1 + 2 * 2)
 
 
-def test_the_original_ages_tracks_only_if_they_are_more_than_the_boxes():
-    tracker = OriginalTracker()
-    tracker.update(stamp(1), at((1.0, 0.0), (3.0, 0.0)))
-    for number in range(2, 60):  # a new person gets the ID of one that left
-        people = tracker.update(stamp(number), at((1.0, 0.0), (9.0, 9.0)))
-        assert [person.id for person in people] == [1, 2]
-    for number in range(60, 89):
-        assert len(tracker.update(stamp(number), at((1.0, 0.0)))) == 2
-    assert [person.id for person in tracker.update(stamp(89), at((1.0, 0.0)))] == [1]
-
-
-def test_the_original_uses_the_camera_pose_at_the_arrival_of_detections():
-    run = simulate(made_sequences(0, 30)[1], DRIVING, 0, seconds=2)
-    moved = as_it_arrived(run)
-    for image, late in zip(run.images, moved.images):
-        assert late.stamp_ns == image.arrival_ns and len(late.detections) == len(image.detections)
-        for detection, other in zip(image.detections, late.detections):
-            seen = np.linalg.inv(image.view.fixed_from_camera).dot(np.append(detection.position_m, 1))
-            assert np.allclose(np.linalg.inv(late.view.fixed_from_camera).dot(np.append(other.position_m, 1)), seen)
+def test_the_same_seed_gives_the_same_run_and_another_one_another():
+    sequence = made_sequences(0, 30)[1]
+    first, again, other = (simulate(sequence, DRIVING, seed, seconds=1) for seed in ((3, 0), (3, 0), (3, 1)))
+    assert len(first.images) == len(again.images)
+    for image, same in zip(first.images, again.images):
+        assert image.stamp_ns == same.stamp_ns and image.sources == same.sources
+        assert all(np.array_equal(a.position_m, b.position_m) for a, b in zip(image.detections, same.detections))
+    assert first.images[0].stamp_ns != other.images[0].stamp_ns
 
 
 @pytest.mark.needs('trackeval')

@@ -12,7 +12,7 @@ from ros_3d_bb.tracking.measurement_model import NoiseParams
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker, ThesisTrackerParams
 from ros_3d_bb.tracking.track import PredictionParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
-from ros_3d_bb.tracking.types import VISIBLE, CameraView, Detection
+from ros_3d_bb.tracking.types import CameraView, Detection
 from support.cylinders import mounted
 from support.states import covariance_of
 
@@ -80,21 +80,6 @@ def test_a_detected_person_keeps_one_id_at_the_ends_of_all_sliders(make, kinds, 
                            score=0.97)
         published.append([track.id for track in tracker.update(START_NS + 3 * image * PERIOD_NS, [person], view)])
     assert published[10:] == [[1]] * 50
-
-
-@settings(max_examples=5, deadline=None)
-@given(SEEDS, st.floats(0, 0.65), st.floats(0.1, 1.0))
-def test_furniture_before_the_legs_leaves_a_person_the_id(seed, hidden_share, hidden_s):
-    """A table hides the lower part of the body for a while; the border of the image cuts nothing."""
-    random, tracker, height_m = np.random.RandomState(seed), Tracker(), 1.7
-    view, published = CameraView(mounted(1.0), CAMERA), []
-    for image in range(90):
-        time_s = image / 30.0
-        seen_m = height_m * (1 - hidden_share if 1.5 < time_s < 1.5 + hidden_s else 1) + random.normal(0, 0.03)
-        center_m = np.array([3, 0.4 * time_s - 1, height_m - seen_m / 2]) + random.normal(0, 0.03, 3) * (1, 1, 0)
-        detection = Detection(center_m, np.array([0.5, 0.5, seen_m]), np.eye(3) * 0.04 ** 2)
-        published.append(tracker.update(START_NS + image * PERIOD_NS, [detection], view))
-    assert all([(track.id, track.status) for track in tracks] == [(1, VISIBLE)] for tracks in published[20:])
 
 
 @pytest.mark.slow

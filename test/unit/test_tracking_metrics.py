@@ -1,9 +1,8 @@
 """Scores of the tracking benchmark on cases with known answers."""
-
 import numpy as np
 import pytest
 
-from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject
+from ros_3d_bb.tracking.types import VISIBLE, TrackedObject
 from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel
 from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
 from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S, Image, Run, RunTruth
@@ -76,11 +75,6 @@ def test_errors_of_velocity_and_prediction_are_lengths_in_the_plane():
     assert result['ade_1s_m'] == pytest.approx(0.375) and result['ade_2s_m'] == pytest.approx(0.625)
 
 
-def test_predictions_without_ground_truth_do_not_count():
-    result = scores(run_of(future=False), right)
-    assert result['fde_2s_m'] is None and result['position_rmse_m'] == pytest.approx(0)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize('factor,coverage', [(1.0, 0.95), (0.25, 1 - np.exp(-5.991 * 0.25 / 2)), (100.0, 1.0)])
 def test_coverage_is_the_share_of_errors_within_the_ellipse(factor, coverage):
@@ -100,8 +94,3 @@ def test_coverage_is_the_share_of_errors_within_the_ellipse(factor, coverage):
     result = scores(run, noisy)
     for key in ('coverage_95_position', 'coverage_95_velocity', 'coverage_95_1s', 'coverage_95_2s'):
         assert result[key] == pytest.approx(coverage, abs=0.025), key
-
-
-def test_without_visible_people_and_tracks_scores_are_none():
-    result = scores(run_of((OUT_OF_VIEW, OCCLUDED)), lambda _number, _truth: [])
-    assert (result['id_switches'], result['position_rmse_m']) == (0, None)

@@ -6,7 +6,7 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.sessions.snapshots import ColorImage, Snapshot
-from ros_3d_bb.visualization.image_overlay import BOX_COLOR, colorize_depth
+from ros_3d_bb.visualization.image_overlay import BOX_COLOR, colorize_depth, depth_to_grey
 from ros_3d_bb.visualization.viewer_layout import RATE_WINDOW_NS, FrameRate, box_lines, compose
 
 BOX = Box3D(np.array([0.5, -0.25, 2.0]), np.array([0.5, 1.75, 0.5]), (100, 40, 200, 160), 0.75,
@@ -35,6 +35,13 @@ def test_boxes_are_drawn_in_the_third_panel_only():
     assert picture[100, 640 + 100].tolist() == list(BOX_COLOR)
     for panel in range(2):
         assert not (picture[:240, 320 * panel:320 * (panel + 1)] == BOX_COLOR).all(axis=2).any()
+
+
+def test_near_depth_is_bright_far_depth_is_dark_and_no_depth_is_black():
+    grey = depth_to_grey(DepthImage(np.array([[0, 500, 3000, 9000]], np.uint16), 0.001), 6.0)[0]
+    assert grey[0] == 0 and grey[1] > grey[2] > grey[3] > 0
+    unknown = DepthImage(np.array([[np.nan, np.inf, -1]], np.float32), 1.0)
+    assert depth_to_grey(unknown, 6.0)[0].tolist() == [0, 0, 0]
 
 
 def test_positions_are_shown_as_text():

@@ -1,16 +1,14 @@
 """Reading of YOLOv5 checkpoints, and rejection of damaged and malicious files without executing code from them."""
-import os
 import pickle
 import re
 import zipfile
 
 import numpy as np
 import pytest
-import torch
 
 from ros_3d_bb.detection.weights import WeightsError
 from ros_3d_bb.detection.yolov5.checkpoint import EXPECTED, read_checkpoint
-from support.checkpoints import official_classes, supported, write_checkpoint
+from support.checkpoints import write_checkpoint
 from support.layouts import layout
 from support.red_detector import write_red_detector
 
@@ -53,19 +51,8 @@ def test_reads_weights_layout_and_names(path, release, model, root):
         np.testing.assert_array_equal(weights[name].astype(np.float32), tensor.numpy().astype(np.float32))
 
 
-def change(path, content, edit):
-    """Write a checkpoint after an edit of its objects, which are instances of the official classes."""
-    write(path, content)
-    with official_classes():
-        objects = torch.load(path, **supported(torch.load, weights_only=False))
-        edit(objects)
-        torch.save(objects, path)
-
-
-@pytest.mark.parametrize('module,name', [('builtins', 'eval'), ('builtins', 'getattr'), ('torch', 'load'),
-                                         ('torch.hub', 'load'), ('subprocess', 'Popen'), ('torch.jit', 'load'),
-                                         ('torch._utils', '_rebuild_device_tensor_from_numpy'), ('nt', 'system'),
-                                         ('modelsx', 'Model'), ('runpy', '_run_code'), ('collections', 'Counter')])
+@pytest.mark.parametrize('module,name', [('builtins', 'eval'), ('torch', 'load'), ('subprocess', 'Popen'),
+                                         ('torch._utils', '_rebuild_device_tensor_from_numpy'), ('modelsx', 'Model')])
 def test_names_outside_the_allow_list_are_rejected(path, module, name):
     write_pickle(path, b'c%s\n%s\n.' % (module.encode(), name.encode()))
     with pytest.raises(WeightsError, match=re.escape('%s.%s' % (module, name))):
@@ -80,8 +67,7 @@ def test_the_error_for_ultralytics_models_is_how_to_export_them(path, name):
         read_checkpoint(path)
 
 
-@pytest.mark.parametrize('name', ['models.common', 'numpy.core.multiarray', 'torch.nn.modules.conv', 'pathlib',
-                                  'utils.loss'])
+@pytest.mark.parametrize('name', ['models.common', 'numpy.core.multiarray', 'pathlib'])
 def test_allowed_modules_are_replaced_by_stand_ins(path, name):
     """Nothing is called; the error is that the file contains no model."""
     write_pickle(path, b'c%s\nsystem\n(S"exit 1"\ntR.' % name.encode())
@@ -100,9 +86,7 @@ def tensor(storage=STORAGE, offset=b'K\0', size=b'(K\4t', stride=b'(K\1t'):
 
 @pytest.mark.parametrize('change, named', [
     ({}, r'models\.yolo\.Model'),  # the tensor is valid, but the file contains no model
-    ({'size': b'(K\5t'}, 'exceeds'), ({'offset': b'K\1'}, 'exceeds'), ({'stride': b'(K\2t'}, 'exceeds'),
-    ({'offset': b'J\xff\xff\xff\xff'}, 'exceeds'), ({'stride': b'(J\xff\xff\xff\xfft'}, 'exceeds'),
-    ({'stride': b'(K\1K\1t'}, 'exceeds'), ({'size': b'(J\xff\xff\xff\x7ft', 'stride': b'(K\0t'}, '2147483647'),
+    ({'size': b'(K\5t'}, 'exceeds'), ({'offset': b'J\xff\xff\xff\xff'}, 'exceeds'), ({'stride': b'(K\2t'}, 'exceeds'),
     # a view with a stride of 0 is larger than its memory
     ({'storage': tensor(size=b'(M\xff\xfft', stride=b'(K\0t'), 'size': b'(M\xff\xfft'}, 'archive')])
 def test_tensors_that_exceed_their_storage_are_rejected(path, change, named):
@@ -117,15 +101,11 @@ def with_flipped_byte(content):
 
 
 @pytest.mark.parametrize('prepare, named', [
-    (lambda path, content: write(path, content[:len(content) // 2]), 'zip'),
     (lambda path, content: write(path, with_flipped_byte(content)), 'CRC'),
     (lambda path, content: write(path, b'Not Found'), 'zip'),
-    (lambda path, content: write(path, pickle.dumps({'model': 1})), 'zip'),
     (lambda path, content: write_checkpoint(path, LAYOUT, root='SegmentationModel'), 'SegmentationModel'),
-    (lambda path, content: torch.save({'model': {'weight': torch.zeros(3)}}, path), 'dict'),
     (lambda path, content: write_pickle(path, pickle.dumps({}, 2), zipfile.ZIP_DEFLATED), 'data.pkl is compressed'),
     (lambda path, content: write_red_detector(path), '.torchscript'),
-    (lambda path, content: os.mkdir(path), 'Is a directory'),
     (lambda path, content: None, 'No such file')])
 def test_errors_name_the_file_the_cause_and_the_expected_format(path, content, prepare, named):
     prepare(path, content)
