@@ -71,20 +71,6 @@ def test_boxes_become_3d_in_the_frame_and_at_the_stamp_of_the_image(rig, output,
     assert box.support == 1.0 and not box.truncated
 
 
-@pytest.mark.parametrize('delay_frames', [0, 2, 6])
-def test_late_boxes_get_the_depth_of_their_image(rig, output, now, delay_frames):
-    """The number of each depth image is its depth in millimetres."""
-    for frame in range(30 + delay_frames):
-        if frame < 30:
-            rig.send_camera(now + frame * PERIOD, 1000 + frame)
-        if frame >= delay_frames:
-            rig.send_boxes(now + (frame - delay_frames) * PERIOD)
-            output.wait_for(frame - delay_frames + 1)
-    for frame, message in enumerate(output.messages):
-        assert message.header.stamp == time_from(now + frame * PERIOD)
-        assert message.boxes[0].center.position.z == pytest.approx(1.0 + frame / 1000)
-
-
 def test_boxes_without_a_stamp_get_the_image_that_arrived_before_them(rig, output, now):
     """Of two images 0.4 s apart, the one 0.05 s (~assumed_delay) before."""
     for number in range(2):

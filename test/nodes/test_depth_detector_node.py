@@ -2,10 +2,8 @@
 import numpy as np
 import pytest
 import rospy
-from dynamic_reconfigure.client import Client
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
-from std_srvs.srv import SetBool
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg
@@ -14,7 +12,7 @@ from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
-from support.ros import TIMEOUT_S, Recorder, diagnostics_of, publisher
+from support.ros import Recorder, diagnostics_of, publisher
 
 START_NS = 1000 * NS
 PEOPLE = [{'start': [4.0, 0.8], 'facing': 3.1, 'height': 1.8}, {'start': [5.0, -0.9], 'facing': 1.6, 'height': 1.7}]
@@ -85,25 +83,3 @@ def test_without_a_transform_the_floor_is_fitted_to_the_depth_image(rig, output)
     sent = rig.send(frame_id='another_camera')
     assert_people(output.wait_for(1)[0], *sent)
     assert diagnostics_of('depth_detector_node')[2]['tilt of the camera unknown'] == 1
-
-
-def test_the_service_pauses_and_resumes(rig, output):
-    enable = rospy.ServiceProxy('depth_detector_node/enable', SetBool)
-    enable(False)
-    rig.send()
-    assert output.stays_at(0)
-    enable(True)
-    rig.send()
-    output.wait_for(1)
-
-
-def test_a_changed_range_applies_from_the_next_image_on(rig, output):
-    """One of the people is 4 m away and one 5 m."""
-    client = Client('depth_detector_node', timeout=TIMEOUT_S)
-    counts = []
-    for max_depth in (6.5, 4.5, 6.5):
-        client.update_configuration({'max_depth': max_depth})
-        rig.send()
-        counts.append(len(boxes2d_from_msg(output.wait_for(len(counts) + 1)[-1]).boxes))
-    client.close()
-    assert counts == [2, 1, 2]

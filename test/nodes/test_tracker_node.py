@@ -96,18 +96,6 @@ def test_a_late_transform_is_awaited(rig, tracks, now):
     assert tracks.wait_for(1)[0].header.stamp == time_from(now)
 
 
-def test_markers_are_created_only_for_subscribers(rig, tracks, now):
-    """The writer keeps the histories: none is there when it is asked for the first time in 5 s."""
-    for frame in range(50):
-        rig.send(now + frame * PERIOD, (0.0, 0.0, 3.0))
-        tracks.wait_for(frame + 1)
-    with Recorder('visualization_marker_array', MarkerArray) as markers:
-        for frame in range(50, 52):
-            rig.send(now + frame * PERIOD, (0.0, 0.0, 3.0))
-            message = markers.wait_for(frame - 49)[-1]
-            assert ('history' in [marker.ns for marker in message.markers]) == (frame > 50)
-
-
 @pytest.fixture
 def tuned(rig):
     """Changes parameters; afterwards they are as they were."""

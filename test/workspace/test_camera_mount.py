@@ -304,11 +304,6 @@ def test_the_floor_and_the_error_model_can_be_none():
     assert not [name for name in parameters if name.endswith('/error_model')]
 
 
-def test_the_transform_that_the_doctor_advises_is_that_of_the_arguments():
-    pose, _parent, _child = pose_in('0 0 1.2 -1.5708 0 -1.6708 map optical'.split())
-    np.testing.assert_allclose(pose, mounted_camera(1.2, 0.1, 0), atol=1e-4)
-
-
 @pytest.mark.parametrize('launch_file, given, named', [
     ('pipeline.launch', ['cameras:=front,rear', 'camera_height:=1.2'], ['cameras', 'camera_height']),
     ('pipeline.launch', ['cameras:=front', 'camera_height:=1.2'], ['cameras', 'camera_height']),

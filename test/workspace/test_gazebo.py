@@ -15,12 +15,6 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 CAMERA = os.path.join(ROOT, 'urdf', 'd435i.urdf.xacro')
 CAMERA_POSITION = (0.17, 0.0, 0.20)  # in base_link, thesis 3.5.1
 FX, WIDTH, HEIGHT = 614.686, 640, 480  # camera_info of the D435i of the thesis
-OWN_ARGUMENTS = {'world', 'gui', 'x', 'y', 'yaw', 'fps', 'paused', 'lockstep', 'joystick', 'navigation'}
-
-
-def default_of(launch_file):
-    arguments = ElementTree.parse(os.path.join(ROOT, 'launch', launch_file)).getroot().findall('arg')
-    return {argument.get('name'): argument.get('default') for argument in arguments}
 
 
 @pytest.fixture
@@ -75,10 +69,6 @@ def test_the_simulated_camera_has_the_intrinsics_of_the_real_one(robot):
     cutoffs = [float(sensor.findtext('plugin/pointCloudCutoff' + end)) for end in ('', 'Max')]
     near, far = (float(sensor.findtext('camera/clip/' + key)) for key in ('near', 'far'))
     assert near <= cutoffs[0] < cutoffs[1] <= far
-
-
-def test_the_launch_file_passes_only_arguments_of_the_pipeline():
-    assert set(default_of('gazebo.launch')) - OWN_ARGUMENTS <= set(default_of('pipeline.launch'))
 
 
 def test_the_launch_file_starts_gazebo_the_robot_and_the_pipeline(tmp_path):

@@ -121,21 +121,6 @@ def test_the_history_is_the_path_and_fades_with_age():
     assert set(rgb(color) for color in history.colors) == {PALETTE[0]}
 
 
-def test_a_history_begins_with_the_second_image_and_has_a_length():
-    assert history_of(MarkerWriter(), 1) is None and history_of(MarkerWriter(), 2) is not None
-    assert history_of(MarkerWriter(MarkerParams(marker_history=0.0)), 50) is None
-
-
-def test_colors_by_id_differ_from_each_other_and_from_arrows_and_gray_ids():
-    markers = drawn([track(number) for number in range(1, 12)])
-    colors = [rgb(markers['cylinder', number].color) for number in range(1, 12)]
-    assert colors[0] == colors[10] == rgb(markers['history', 1].color) == rgb(markers['ellipse', 1].color)
-    others = [markers['velocity', 1], markers['prediction', 1], drawn([track(1, status=OCCLUDED)])['id', 1]]
-    colors = np.array(colors[:10] + [rgb(marker.color) for marker in others])
-    distances = np.linalg.norm(colors[:, None] - colors[None], axis=2)
-    assert distances[~np.eye(len(colors), dtype=bool)].min() > 0.2
-
-
 @pytest.mark.parametrize('status', [OCCLUDED, OUT_OF_VIEW])
 @pytest.mark.parametrize('coloring', ['id', 'status', 'thesis'])
 def test_tracks_that_are_not_visible_are_paler_and_have_a_question_mark(status, coloring):

@@ -16,7 +16,6 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.nodes.bbox3d_node import SampleImages
 from ros_3d_bb.nodes.common import master, startup, subscribers
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics, unsubscribed_results
-from support.pages import node_pages
 from support.ros import wait_until
 
 
@@ -34,13 +33,6 @@ def test_a_node_that_cannot_start_names_the_launch_argument(name, parts, place):
     text, *values = mocked['logfatal'].call_args[0]
     expected = '/%s cannot start: parameter ~stride is 0; the service ~enable works%s' % (name, place)
     assert text % tuple(values) == expected
-
-
-def test_launch_files_have_the_arguments_that_messages_name():
-    for node, argument in startup.PARAMS_FILES.items():
-        launch_files = [launch for launch, _element in node_pages.starting(node)] if argument == 'params' \
-            else node_pages.launch_files()
-        assert any(name == argument for launch in launch_files for name, _default, _doc in launch.arguments), node
 
 
 def test_a_request_to_a_master_that_hangs_ends(monkeypatch):

@@ -42,14 +42,6 @@ def test_the_missing_frame_of_each_camera_is_named(transforms):
         assert 'tf has no frame %s;' % camera in why_not(transforms, camera)
 
 
-def test_the_age_is_that_of_each_camera(transforms):
-    assert transforms.age() == 'not requested yet'
-    why_not(transforms, 'rear')
-    assert transforms.age() == 'none from rear to map'
-    why_not(transforms, 'front')
-    assert transforms.age() == 'none from front to map, none from rear to map'
-
-
 def test_lookups_of_other_cameras_succeed_while_a_fault_is_explained(transforms, monkeypatch):
     """The tree is read while the other thread holds it up."""
     looked = []

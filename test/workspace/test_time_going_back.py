@@ -1,12 +1,9 @@
 """Backward jumps in time of one of several cameras, or of all, without a master."""
 import pytest
-from geometry_msgs.msg import Quaternion, Transform, TransformStamped
 
-from ros_3d_bb.conversions.perception_msgs import stamp_of, time_from
+from ros_3d_bb.conversions.perception_msgs import stamp_of
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.nodes.tracker_node import TrackerNode
-from support.masterless import masterless, on_the_wire
-from support.two_cameras import PERIOD_NS, START_NS, Rig, Transforms, boxes
+from support.two_cameras import PERIOD_NS, START_NS, Rig
 
 
 @pytest.fixture
@@ -49,22 +46,3 @@ def test_image_awaiting_its_transform_is_dropped_when_time_goes_back(rig):
         front = rig.send(START_NS + number * PERIOD_NS, 'front')
     assert rig.events.counts['jumps back in time'] == 1 and rig.events.counts['images behind other cameras'] == 1
     assert [track.id for track in front.tracks] == [2]
-
-
-def test_the_node_publishes_nothing_from_before_a_jump():
-    """The tf buffer is asked for the rear camera's transform when the front camera's stamps go back."""
-    with masterless({'tf_timeout': 0.0, 'cameras': 'front, rear', 'camera_timeout': 0.0}) as connections:
-        TrackerNode()
-        tracks, transforms = connections.publishers['ros_3d_bb/tracks'], Transforms()
-
-        def send(camera, seconds):
-            connections.send(camera + '/ros_3d_bb/bb_3d', on_the_wire(boxes(START_NS + seconds * NS, camera)))
-
-        def lookup(target, source, stamp):
-            transforms.lookup(target, source, stamp)
-            return TransformStamped(transform=Transform(rotation=Quaternion(-0.5, 0.5, -0.5, 0.5)))
-        connections.buffers[0].lookup_transform_core = lookup
-        send('front', 20)
-        transforms.while_waiting['rear'] = lambda: send('front', 0)
-        send('rear', 20)
-        assert tracks.count == 2 and tracks.newest.header.stamp == time_from(START_NS)
