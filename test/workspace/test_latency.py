@@ -8,7 +8,6 @@ import sys
 import pytest
 
 from ros_3d_bb.bags.bag_writer import write_bag
-from ros_3d_bb_lab.evaluation.latency.rospy_limit import topics_of
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from support.processes import processes_naming
@@ -60,11 +59,3 @@ def test_results_are_written_and_no_process_remains(bag, benchmark, tmp_path):
         assert found['cpu_percent'] == case['cpu_percent'][node] and found['limit_percent'] > 0
         assert found['times_limit'] == pytest.approx(found['cpu_percent'] / found['limit_percent'])
     assert processes_naming(str(tmp_path)) == 0
-
-
-def test_the_topics_of_a_limit_are_those_of_the_node():
-    published = [['/tracks', ['/tracker']], ['/rosout', ['/tracker']], ['/diagnostics', ['/tracker', '/other']],
-                 ['/tracker/parameter_updates', ['/tracker']], ['/boxes', ['/other']]]
-    subscribed = [['/boxes', ['/tracker']], ['/tf', ['/tracker', '/other']], ['/clock', ['/tracker']],
-                  ['/tracks', ['/other', '/rviz']]]
-    assert topics_of('/tracker', (published, subscribed, [])) == ({'/boxes': 0, '/tf': 1}, {'/tracks': 2})

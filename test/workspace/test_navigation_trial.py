@@ -39,15 +39,9 @@ def test_modes_differ_in_what_move_base_knows_of_people(mode):
     assert parameters['/simulator_node/drive'] and parameters['/simulator_node/supervised']
 
 
-@pytest.mark.parametrize('detector, node', [('depth', 'depth_detector_node'), ('yolov5', 'yolov5_node')])
-def test_a_detector_replaces_the_true_boxes(detector, node):
-    parameters, nodes = loaded('navigation_benchmark.launch', 'detector:=' + detector, 'weights:=/some/file.onnx',
-                               *ARGUMENTS)
-    assert not parameters['/simulator_node/boxes'] and nodes[node].type == node
-
-
-def test_a_trial_runs_with_teb():
-    parameters, _nodes = loaded('navigation_benchmark.launch', 'local_planner:=teb', *ARGUMENTS)
+def test_a_detector_replaces_the_true_boxes_and_a_trial_runs_with_teb():
+    parameters, nodes = loaded('navigation_benchmark.launch', 'detector:=depth', 'local_planner:=teb', *ARGUMENTS)
+    assert not parameters['/simulator_node/boxes'] and 'depth_detector_node' in nodes
     assert parameters['/move_base/base_local_planner'] == 'teb_local_planner/TebLocalPlannerROS'
 
 
