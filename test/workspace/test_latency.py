@@ -50,12 +50,8 @@ def test_results_are_written_and_no_process_remains(bag, benchmark, tmp_path):
         found = json.load(stream)
     case, = found['cases']
     assert found['machine'] and case['name'] in printed
-    assert (case['name'], case['detector'], case['load']) == ('free', 'free', 'none')
     assert case['output_hz'] > 0 and 0 < case['p50_ms'] <= case['p95_ms'] <= case['p99_ms']
     assert NODES <= set(case['cpu_percent']) & set(case['rss_mb']) & set(case['trend']['rss_mb_per_minute'])
     assert set(case['nodes']) == {'bbox3d_node', 'tracker_node'}
     assert case['pipeline']['cpu_percent'] == pytest.approx(sum(node['cpu_percent'] for node in case['nodes'].values()))
-    for node, found in case['nodes'].items():
-        assert found['cpu_percent'] == case['cpu_percent'][node] and found['limit_percent'] > 0
-        assert found['times_limit'] == pytest.approx(found['cpu_percent'] / found['limit_percent'])
     assert processes_naming(str(tmp_path)) == 0

@@ -7,6 +7,7 @@ import os
 import re
 import shlex
 
+import numpy as np
 import pytest
 import yaml
 
@@ -46,7 +47,11 @@ CASES = [
         'local layers': ['obstacle_layer', 'people_layer', 'prediction_layer'],
         'global layers': ['static_layer', 'obstacle_layer', 'people_layer', 'inflation_layer'],
         LOCAL + 'prediction_layer/map_topic': 'planner_bridge_node/costs', LOCAL + 'rolling_window': True,
-        GLOBAL + 'rolling_window': None}),
+        GLOBAL + 'rolling_window': None, LOCAL + 'global_frame': 'odom', GLOBAL + 'global_frame': 'map',
+        LOCAL + 'robot_base_frame': 'base_link', LOCAL + 'obstacle_layer/scan/topic': 'front/scan',
+        '/move_base/DWAPlannerROS/odom_topic': 'odometry/filtered'}),  # the names of a Jackal
+    ('jackal.launch driver:=none weights:=/some.pt', {
+        '/tracker_node/target_frame': 'map', '/bbox3d_node/floor_frame': 'base_link'}),
     (OF_USER, {
         LOCAL + 'global_frame': 'my_odom', GLOBAL + 'global_frame': 'my_map', LOCAL + 'robot_base_frame': 'my_base',
         GLOBAL + 'robot_base_frame': 'my_base', LOCAL + 'obstacle_layer/scan/topic': 'my_scan',
@@ -112,6 +117,17 @@ def test_files_of_the_user_take_precedence(tmp_path):
     assert parameters['/planner_bridge_node/timeout'] == 3.0
     assert parameters['/move_base/DWAPlannerROS/max_vel_x'] == 0.4
     assert parameters['/move_base/DWAPlannerROS/max_vel_theta'] == 1.5
+
+
+@pytest.mark.parametrize('local_planner, group', [('dwa', 'DWAPlannerROS'), ('teb', 'TebLocalPlannerROS')])
+def test_commands_are_within_the_limits_of_a_jackal(local_planner, group):
+    """Those of its controller and twist_mux, github.com/jackal/jackal (commit c6ab6ca)."""
+    parameters, _nodes = loaded('navigation.launch', 'local_planner:=' + local_planner)
+    for name, limit in (('max_vel_x', 2.0), ('acc_lim_x', 20.0), ('max_vel_theta', 4.0), ('acc_lim_theta', 25.0)):
+        assert parameters['/move_base/%s/%s' % (group, name)] <= limit
+    assert 1 / parameters['/move_base/controller_frequency'] < 0.25  # it stops the robot when commands stay away
+    half_m = np.min(np.abs(parameters[LOCAL + 'footprint']), axis=0) + parameters[LOCAL + 'footprint_padding']
+    assert (half_m >= (0.229, 0.208)).all()  # the wheels
 
 
 def test_the_footprint_of_the_local_planner_and_the_costmaps_is_one():
