@@ -53,7 +53,7 @@ class Bbox3dNode(object):
     Publishes
     ---------
     ros_3d_bb/bb_3d : ros_3d_bb/BoundingBox3DArray
-        3D boxes in the optical frame of the camera, with the stamp of the image in which they were detected.
+        3D boxes in the optical frame of the camera, with the stamp of the depth image.
     """
 
     def __init__(self, part=Part()):
