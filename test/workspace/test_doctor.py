@@ -213,23 +213,15 @@ def test_a_missing_master_is_reported(monkeypatch, uri, fault):
     assert found.subject == 'master' and fault in found.fault and found.fix
 
 
-@pytest.fixture
-def observed_streams():
-    """Returns the streams of a graph without messages, given (node, {input: topic}) from the diagnostics of nodes."""
+def test_robot10_is_not_robot1():
+    """The inputs of nodes in another namespace, in their diagnostics, are not those of this robot."""
+    message = DiagnosticArray(status=[
+        DiagnosticStatus(name='robot10/bbox3d_node: pipeline',
+                         values=[KeyValue('input ' + DEPTH[1:], '/robot10/depth 30.0 Hz')]),
+        DiagnosticStatus(name='robot1/bbox3d_node: pipeline')])
     with masterless() as connections, mock.patch('rospy.get_namespace', lambda: '/robot1/'), \
             mock.patch('rospy.resolve_name', lambda name: '/robot1/' + name), mock.patch('time.sleep') as sleep, \
             mock.patch('ros_3d_bb.nodes.common.graph_observer.published_topics', dict):
-        def observed(reports, camera=''):
-            message = DiagnosticArray(status=[DiagnosticStatus(name=node + ': pipeline', values=[
-                KeyValue('input ' + name, topic + ' 30.0 Hz') for name, topic in inputs.items()])
-                                              for node, inputs in reports])
-            sleep.side_effect = lambda _s: connections.subscribers['/diagnostics'].callback(message)
-            seen = GraphObserver(camera=camera).observations()
-            return {key: stream.topic for key, stream in seen.streams.items()}, set(seen.nodes)
-        yield observed
-
-
-def test_robot10_is_not_robot1(observed_streams):
-    topics, nodes = observed_streams([('robot10/bbox3d_node', {DEPTH[1:]: '/robot10/depth'}),
-                                      ('robot1/bbox3d_node', {})])
-    assert nodes == {'robot1/bbox3d_node'} and topics['depth'] == '/robot1' + DEPTH
+        sleep.side_effect = lambda _s: connections.subscribers['/diagnostics'].callback(message)
+        seen = GraphObserver(camera='').observations()
+    assert set(seen.nodes) == {'robot1/bbox3d_node'} and seen.streams['depth'].topic == '/robot1' + DEPTH

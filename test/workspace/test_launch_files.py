@@ -15,12 +15,12 @@ from support.launching import ROOT, dumped, given_to_stand_ins, loaded
 
 JACKAL_CAMERA = os.path.join(ROOT, 'urdf', 'jackal_d435i.urdf.xacro')
 MEASURE = 'measure.launch session:="/a session" weights:=/some.pt '
-OWN_DRIVER = 'realsense.launch driver:=pyrealsense2 camera:=front width:=848 fps:=15 filters:=spatial exposure:=0.008'
+OWN_DRIVER = 'realsense.launch driver:=pyrealsense2 '
 LOCAL, GLOBAL = '/move_base/local_costmap/', '/move_base/global_costmap/'
 OF_USER = ('navigation.launch frame_world:=my_map odom_frame:=my_odom robot_frame:=my_base scan_topic:=my_scan '
            'odom_topic:=my_odometry map_topic:=my_map_topic cmd_vel_topic:=my_cmd_vel')
 MOUNT = '0.17 0 0.20 0 0 0 base_link camera_link'
-# A command, and what it sets: parameters, `nodes`, `NODE:TOPIC` for a remapping and `COSTMAP layers`.
+# A command, and what it sets: parameters, `nodes`, `TYPE:TOPIC` for a remapping and `COSTMAP layers`.
 CASES = [
     (MEASURE, {'nodes': ['people_node', 'viewer_node'], '/viewer_node/session': '/a session',
                '/viewer_node/window': True, '/tracker_node/target_frame': 'map',
@@ -30,10 +30,12 @@ CASES = [
     (MEASURE + 'camera_image:=a/color bb_topic:=a/boxes', {
         'viewer_node:camera/color/image_raw': 'a/color', 'people_node:camera/color/image_raw': 'a/color',
         'viewer_node:yolo_bounding_box': 'a/boxes', 'people_node:yolo_bounding_box': 'a/boxes'}),
-    (OWN_DRIVER, {
-        'nodes': ['realsense_node'], '/use_sim_time': None, '/realsense_node/frame_prefix': 'front',
+    (OWN_DRIVER + 'width:=848 fps:=15 filters:=spatial exposure:=0.008', {
+        'nodes': ['realsense_node'], '/use_sim_time': None, '/realsense_node/frame_prefix': 'camera',
         '/realsense_node/width': 848, '/realsense_node/height': 480, '/realsense_node/fps': 15,
-        '/realsense_node/filters': 'spatial', '/realsense_node/exposure': 0.008, '/realsense_node/publish_clock': False,
+        '/realsense_node/filters': 'spatial', '/realsense_node/exposure': 0.008,
+        '/realsense_node/publish_clock': False}),
+    (OWN_DRIVER + 'camera:=front', {
         'realsense_node:camera/color/image_raw': 'front/color/image_raw',
         'realsense_node:camera/color/camera_info': 'front/color/camera_info',
         'realsense_node:camera/aligned_depth_to_color/image_raw': 'front/aligned_depth_to_color/image_raw',
@@ -84,7 +86,7 @@ def test_arguments_set_parameters_nodes_and_topics(command, expected):
     found, nodes = loaded(*shlex.split(command))
     found['nodes'] = sorted(nodes)
     for node in nodes.values():
-        found.update(('%s:%s' % (node.name, topic), target) for topic, target in node.remap_args)
+        found.update(('%s:%s' % (node.type, topic), target) for topic, target in node.remap_args)
     for costmap in ('local', 'global'):
         layers = found.get('/move_base/%s_costmap/plugins' % costmap, [])
         found[costmap + ' layers'] = [layer['name'] for layer in layers]
