@@ -11,19 +11,24 @@ from dynamic_reconfigure.client import Client
 from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.srv import Reconfigure
 from rosgraph_msgs.msg import Log
-from sensor_msgs.msg import CameraInfo, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from std_msgs.msg import String
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
+from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
 from ros_3d_bb.conversions.perception_msgs import tracks_from_msg
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.common.reconfigure_server import live_in
+from ros_3d_bb.nodes.common.subscribers import subscribe
 from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams
 from ros_3d_bb.visualization.markers import MarkerParams
+from support.compressed import compressed_fields
 from support.rolled_camera import RolledSimulator
-from support.ros import TIMEOUT_S, Recorder, publisher, wait_until
+from support.ros import TIMEOUT_S, Recorder, depth_message, publisher, wait_until
 
 LIVE = {'bbox3d_node': live_in([Bbox3dParams]),
         'depth_detector_node': live_in([DepthDetectorParams, DepthPeopleParams]),
@@ -57,6 +62,23 @@ def test_people_are_tracked_above_the_floor_that_is_seen():
     tracks_m = np.array([track.position_m[:2] for track in tracks_from_msg(last)])
     apart_m = np.linalg.norm(tracks_m[:, None] - truth_m[last.header.stamp.to_nsec()], axis=2)
     assert apart_m.shape == (3, 3) and apart_m.min(axis=0).max() < 0.2
+
+
+def test_the_publisher_decides_the_type_of_images():
+    """A message of another type is left out; the diagnostics report such a topic as silent."""
+    image, received = depth_message(NS, 2000), {}
+    for name, message in (('plain', image), ('other', String('no image')), ('compressed', CompressedImage(
+            **compressed_fields(image, 'compressedDepth rvl')))):
+        received[name] = []
+        subscriber = subscribe('images/' + name, Image, received[name].append)
+        sender = publisher('images/' + name, type(message))
+        for _message in range(2):
+            sender.publish(message)
+        if name != 'other':
+            wait_until(lambda: len(received[name]) == 2, name)
+        subscriber.unregister()
+        assert [type(each) for each in received[name]] == [type(message)] * (0 if name == 'other' else 2)
+    np.testing.assert_array_equal(imgmsg_to_depth(received['compressed'][0]).values, np.full((48, 64), 2000))
 
 
 @pytest.fixture(scope='module')

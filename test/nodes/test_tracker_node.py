@@ -80,15 +80,6 @@ def test_tracks_are_in_the_map_at_the_stamp_of_the_image(rig, tracks, now):
     assert track.pose.covariance[0] < track.prediction[0].covariance[0] < track.prediction[-1].covariance[0]
 
 
-def test_a_standing_person_has_no_speed_while_the_robot_drives(rig, tracks, now):
-    for frame in range(20):
-        rig.send(now + frame * PERIOD, (0.0, 0.0, 5.0 - 0.1 * frame), x=0.1 * frame)
-        tracks.wait_for(frame + 1)
-    track, = tracks.wait_for(20)[-1].objects
-    assert track.pose.pose.position.x == pytest.approx(5.0, abs=0.01)
-    assert abs(track.twist.twist.linear.x) < 0.01 and not track.moving
-
-
 def test_a_late_transform_is_awaited(rig, tracks, now):
     rig.send_boxes(now, (0.0, 0.0, 3.0))
     time.sleep(0.02)

@@ -20,7 +20,6 @@ KEYS = {'numpy': 'python3-numpy', 'cv2': 'python3-opencv', 'torch': 'python3-tor
         'yaml': 'python3-yaml', 'matplotlib': 'python3-matplotlib', 'scipy': 'python3-scipy',
         'norfair': None, 'trackeval': None, 'pyrealsense2': None,
         'PyQt5': None}  # part of python_qt_binding, and used without it
-TEST_KEYS = {'pytest': 'python3-pytest', 'hypothesis': 'python3-hypothesis'}
 # What Melodic's own Python packages need on Python 3.
 FOR_MELODIC = {'python3-gnupg', 'python3-pycryptodome'}
 FOR_DEBIAN = {'tf2_tools'}  # which has programs of tf2_ros there
@@ -74,19 +73,6 @@ def test_every_import_is_declared_and_every_dependency_is_used():
 def test_nodes_that_rarely_draw_images_do_not_load_opencv(node):
     code = 'import sys, ros_3d_bb.nodes.%s; sys.exit("cv2" in sys.modules)' % node
     assert subprocess.call([sys.executable, '-c', code]) == 0
-
-
-def test_imports_of_the_tests_are_declared_or_in_their_requirements():
-    names = imported(glob.glob(inside('test', '**', '*.py'), recursive=True))
-    # gazebo_msgs: test/gazebo needs Gazebo; people_msgs: real or a stand-in
-    names -= {'support', 'fuzz', 'test_faults', 'conftest', 'gazebo_msgs', 'people_msgs'}
-    with open(inside('test', 'requirements.txt')) as stream:
-        required = set(re.findall(r'^([\w-]+)', stream.read(), re.MULTILINE))
-    known = declared('depend', 'exec_depend', 'test_depend')
-    assert [name for name in names
-            if TEST_KEYS.get(name, KEYS.get(name) or name) not in known and name not in required] == []
-    programs = declared('test_depend') - set(TEST_KEYS.values()) - names
-    assert programs == {'rosbash', 'roscpp', 'rosservice', 'rostest', 'xdotool', 'xvfb'}
 
 
 def test_no_paths_of_this_machine_and_no_stamps_of_the_current_time():
@@ -146,15 +132,6 @@ def test_launch_files_load_and_document_their_arguments(name):
         inner = os.path.relpath(os.path.realpath(str(value)), ROOT)
         if str(value).startswith(os.sep) and not inner.startswith(os.pardir):
             assert os.path.exists(inside(inner)) and inner.split(os.sep)[0] in INSTALLED, value
-
-
-@pytest.mark.parametrize('name', ['yolov5.launch', 'bbox3d.launch', 'tracker.launch', 'depth_detector.launch',
-                                  'planner_bridge.launch', 'realsense_node.launch', 'viewer.launch'])
-def test_launch_files_set_only_parameters_of_the_node(name):
-    parameters, _nodes = loaded(name, *REQUIRED_ARGUMENTS)
-    node = NODES[name.replace('_node', '').replace('.launch', '_node')]
-    params_from({key.split('/', 2)[2]: value for key, value in parameters.items()},
-                *node_pages.parameter_types(node.node_class))
 
 
 @pytest.mark.parametrize('name, variable', [

@@ -141,12 +141,6 @@ def test_the_error_model_gives_the_tracker_the_range_of_the_detector(tmp_path):
         assert ids(results[-1]) == expected
 
 
-@pytest.mark.parametrize('tracker', ['kalman', 'thesis'])
-def test_a_missing_error_model_is_named(tracker):
-    with pytest.raises(ValueError, match='nowhere.yaml.*absolute path expected'):
-        Rig(tracker=tracker, error_model='nowhere.yaml')
-
-
 def map_in(frame_id, **fields):
     grid = OccupancyGrid(header=Header(frame_id=frame_id), data=[100, 0, 64, -1])
     grid.info.width, grid.info.height, grid.info.resolution, grid.info.origin.orientation.w = 2, 2, 0.1, 1.0
