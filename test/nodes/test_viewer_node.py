@@ -11,11 +11,10 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header, Int32MultiArray
 from std_srvs.srv import SetBool, SetBoolResponse, Trigger
 
-from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.conversions.camera_msgs import frame_id_of
 from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg, boxes3d_to_msg, time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
+from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
@@ -58,8 +57,8 @@ class Rig(object):
             if topic in self.pubs:
                 self.pubs[topic].publish(message)
         rects_px = [tuple(int(edge) for edge in person.box_px) for person in frame.people]
-        boxes = estimate_boxes(DepthImage(frame.depth_mm, 0.001), rects_px, self.simulator.camera,
-                               estimator_named('foreground'))
+        boxes = [Box3D(np.array([0.5, 0.1, 3.0]), np.array([0.5, 1.7, 0.5]), rect_px, 0.75, (False,) * 4)
+                 for rect_px in rects_px]
         if with_boxes:
             header = Header(stamp=time_from(stamp_ns), frame_id=frame_id_of(''))
             self.pubs[BOXES2D].publish(boxes2d_to_msg(np.array(rects_px), header))

@@ -1,6 +1,7 @@
 """bbox3d_node without a master: 3D boxes, 2D boxes without a stamp, and debug images."""
 import numpy as np
 import pytest
+from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray
 
 from fuzz.hostile import good_messages
@@ -55,6 +56,7 @@ def test_debug_images_are_published_while_they_have_subscribers(connections):
     images = {name: connections.publishers['ros_3d_bb/' + name] for name in ('color', 'raw', 'depth')}
     for number in range(3):  # colour is subscribed with the first boxes
         send_image(connections, START_NS + number * NS // 30)
+        connections.send(COLOR_TOPIC, Image())  # without a stamp
     assert (imgmsg_to_rgb(images['color'].newest) == VALID_COLOR).all(axis=2).any()
     assert np.unique(imgmsg_to_rgb(images['raw'].newest)).tolist() == [90]
     assert images['depth'].newest.encoding == 'mono8'

@@ -1,10 +1,10 @@
 """Cameras that are rotated, tilted, or without tf: the same positions as from an upright camera on a robot."""
 import argparse
 import re
+from unittest import mock
 
 import numpy as np
 import pytest
-import rosbag
 import roslaunch
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
@@ -27,6 +27,7 @@ from ros_3d_bb.nodes.doctor import bag_findings
 from ros_3d_bb.pipeline.detection_stage import CameraRotation, Yolov5NodeParams, detect_in_color
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
+from support.bags import changed_bag, messages_in
 from support.launching import loaded
 from support.masterless import masterless
 from support.rolled_camera import FRAME, HEIGHT_M, ROLL_RAD, TILT_RAD, RolledSimulator
@@ -60,10 +61,7 @@ def processed(folder, *options):
     bags = str(folder / 'in.bag'), str(folder / 'out.bag')
     given = _parser().parse_args(bags + ('--detector', 'depth') + options)
     events = process_bag(*bags, _settings_from(given))
-    found = {}
-    with rosbag.Bag(str(folder / 'out.bag')) as bag:
-        for topic, message, _time in bag.read_messages(['/yolo_bounding_box', '/ros_3d_bb/tracks']):
-            found.setdefault(topic, []).append(message)
+    found = messages_in(folder / 'out.bag', '/yolo_bounding_box', '/ros_3d_bb/tracks')
     return found, events
 
 
@@ -138,11 +136,12 @@ def test_the_doctor_fits_height_tilt_and_roll_to_the_floor(rolled):
 def test_the_doctor_notices_a_rotated_camera_without_tf(recorded, tmp_path, turns, late_ns):
     """Whether or not its colour and depth images have the same stamps."""
     recorded(tmp_path / 'same.bag', turns, with_tf=False)
-    with rosbag.Bag(str(tmp_path / 'same.bag')) as before, rosbag.Bag(str(tmp_path / 'in.bag'), 'w') as after:
-        for topic, message, time in before.read_messages():
-            if topic == '/' + DEPTH_TOPIC:
-                message.header.stamp = time = time_from(time.to_nsec() + late_ns)
-            after.write(topic, message, time)
+
+    def late(topic, message, time):
+        if topic == '/' + DEPTH_TOPIC:
+            message.header.stamp = time = time_from(time.to_nsec() + late_ns)
+        return topic, message, time
+    changed_bag(tmp_path / 'same.bag', tmp_path / 'in.bag', late)
     found, command = doctor_on(tmp_path / 'in.bag')
     assert 'turned clockwise by %d degrees' % (90 * turns) in found['image rotation']
     options = re.search(r'--camera-height (\S+) --camera-tilt (\S+) --image-rotation (\d+)', command)
@@ -154,8 +153,7 @@ class PoseRig(object):
 
     def __init__(self, connections, folder):
         self.connections, self.node, self.stamp_ns = connections, CameraPoseNode(), START_NS
-        with rosbag.Bag(str(folder / 'in.bag')) as bag:
-            self._messages = {topic: message for topic, message, _time in bag.read_messages()}
+        self._messages = {topic: messages[-1] for topic, messages in messages_in(folder / 'in.bag').items()}
 
     def send(self, count):
         """Send images. Returns the published TransformStamped; None without one."""
@@ -213,14 +211,6 @@ def test_unusable_mounts_are_rejected(recorded, tmp_path, capfd, options, compla
     assert error.value.code and complaint in capfd.readouterr().err and not (tmp_path / 'out.bag').exists()
 
 
-class Detector(object):
-    """Detects one box in an upright image."""
-
-    def detect(self, image):
-        self.image = image
-        return Detections(np.array([[1.0, 2.0, 4.0, 9.0]]), np.array([0.9]), np.array([0]))
-
-
 @pytest.mark.parametrize('turns', [0, 1, 2, 3])
 def test_yolov5_sees_upright_images_once_tf_is_known(turns):
     image, known = np.random.RandomState(0).randint(0, 255, (12, 20, 3), np.uint8), []
@@ -230,9 +220,10 @@ def test_yolov5_sees_upright_images_once_tf_is_known(turns):
     transforms = type('Transforms', (), {'lookup': lambda *_arguments: camera_from_floor})()
     rotation = CameraRotation(Yolov5NodeParams(), transforms, lambda: known.append(True))
     assert rotation.turns('optical') == turns and rotation.turns('optical') == turns and known == [True]
-    detector = Detector()
+    found = Detections(np.array([[1.0, 2.0, 4.0, 9.0]]), np.array([0.9]), np.array([0]))
+    detector = mock.Mock(detect=mock.Mock(return_value=found))
     shown, detections = detect_in_color(detector, message, turns)
-    np.testing.assert_array_equal(detector.image, image)
+    np.testing.assert_array_equal(detector.detect.call_args[0][0], image)
     np.testing.assert_array_equal(shown, received)
     x1, y1, x2, y2 = detections.boxes[0].astype(int)
     np.testing.assert_array_equal(turned_image(received[y1:y2, x1:x2], turns), image[2:9, 1:4])
@@ -259,17 +250,6 @@ def test_launch_arguments_publish_the_pose_of_a_camera_alone(degrees):
     assert parameters['/bbox3d_node/floor_frame'] == parameters['/depth_detector_node/floor_frame'] == 'map'
     assert parameters['/depth_detector_node/floor_height'] == 0
     assert parameters['/bbox3d_node/image_rotation'] == degrees
-
-
-@pytest.mark.parametrize('launch_file, more', [
-    ('playback.launch', ('bag:=/b.bag',)), ('measure.launch', ('session:=/s', 'camera:=true', 'driver:=pyrealsense2'))])
-def test_camera_pose_starts_the_node_and_gives_the_floor(launch_file, more):
-    parameters, nodes = loaded(launch_file, 'detector:=depth', 'camera_pose:=floor', 'image_rotation:=90', *more)
-    assert 'camera_pose' not in nodes and nodes['camera_pose_node'].type == 'camera_pose_node'
-    expected = {'frame_world': 'map', 'frame_id': '', 'image_rotation': '90', 'depth': 'aligned', 'depth_scale': 0.0}
-    assert {key: parameters['/camera_pose_node/' + key] for key in expected} == expected
-    assert parameters['/bbox3d_node/floor_frame'] == parameters['/depth_detector_node/floor_frame'] == 'map'
-    assert parameters['/depth_detector_node/floor_height'] == 0 and parameters['/tracker_node/target_frame'] == 'map'
 
 
 @pytest.mark.parametrize('launch_file, given, named', [

@@ -12,6 +12,7 @@ from ros_3d_bb_lab.evaluation.clear_mot import score
 from ros_3d_bb_lab.evaluation.demo.scene_report import panels_of, read_recording
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
+from support.bags import messages_in
 from support.launching import loaded
 from support.two_cameras import Rig
 
@@ -30,11 +31,6 @@ def bags(tmp_path_factory):
     return str(folder / 'in.bag'), str(folder / 'out.bag')
 
 
-def messages_on(bag_path, topic):
-    with rosbag.Bag(bag_path) as bag:
-        return [message for _topic, message, _time in bag.read_messages('/' + topic)]
-
-
 def test_each_person_is_one_track_in_both_views(bags):
     with rosbag.Bag(bags[1]) as bag:
         recording = read_recording(bag)
@@ -50,13 +46,12 @@ def test_each_person_is_one_track_in_both_views(bags):
 
 
 def test_boxes_are_in_the_namespaces_and_people_on_one_topic(bags):
-    frames = {camera: set(message.header.frame_id for message in messages_on(bags[1], camera + '/ros_3d_bb/bb_3d'))
+    found = messages_in(bags[1])
+    frames = {camera: set(message.header.frame_id for message in found['/%s/ros_3d_bb/bb_3d' % camera])
               for camera in ('front', 'left')}
     assert frames == {'front': {'front_color_optical_frame'}, 'left': {'left_color_optical_frame'}}
-    tracks = messages_on(bags[1], 'ros_3d_bb/tracks')
-    stamps = [stamp_of(message) for message in tracks]
-    assert len(tracks) == 38 and stamps == sorted(stamps)
-    assert not messages_on(bags[1], 'ros_3d_bb/bb_3d')
+    stamps = [stamp_of(message) for message in found['/ros_3d_bb/tracks']]
+    assert len(stamps) == 38 and stamps == sorted(stamps) and '/ros_3d_bb/bb_3d' not in found
 
 
 def test_a_camera_missing_in_a_bag_is_named(bags, tmp_path):

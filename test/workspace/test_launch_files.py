@@ -77,6 +77,10 @@ CASES = [
         'rviz:camera/color/image_raw': 'front/color/image_raw'}),
     ('pipeline.launch weights:=/some.pt floor_frame:=none', {
         '/bbox3d_node/floor_frame': '', '/yolov5_node/floor_frame': ''}),
+    ('playback.launch bag:=/b.bag detector:=depth camera_pose:=floor image_rotation:=90', {
+        '/camera_pose_node/frame_world': 'map', '/camera_pose_node/image_rotation': '90',
+        '/bbox3d_node/floor_frame': 'map', '/depth_detector_node/floor_frame': 'map',
+        '/depth_detector_node/floor_height': 0, '/tracker_node/target_frame': 'map'}),
     ('simulation.launch rviz:=false error_model:=none', {
         '/bbox3d_node/floor_frame': 'base_link', '/bbox3d_node/error_model': None, '/tracker_node/error_model': None})]
 

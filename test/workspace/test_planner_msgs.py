@@ -52,32 +52,30 @@ def sent(write, package_name, tracks, frame_id='map'):
 
 
 def obstacles(tracks, frame_id='map'):
-    return sent(obstacles_to_msg, 'costmap_converter', tracks, frame_id)
+    return sent(obstacles_to_msg, 'costmap_converter', tracks, frame_id).obstacles
 
 
-def test_obstacles_are_circles_where_people_are_now_with_velocities_in_the_frame_of_the_planner():
+def test_obstacles_are_circles_where_people_are_now_with_velocities_of_the_frame():
     """TEB takes positions as of now, and transforms them into its frame, but not velocities. The image is 0.3 s old."""
     tracks = predicted_to([walker(3, [1, 2, 0.9], [1.2, 0, 0]), walker(4, [5, 5, 0.9], [0, 0, 0])], 0.3)
-    walking, standing = obstacles(in_frame(tracks, QUARTER), 'odom').obstacles
+    walking, standing = obstacles(in_frame(tracks, QUARTER), 'odom')
     for obstacle, position_m, velocity_mps in ((walking, [8, 6.36], [0, 1.2]), (standing, [5, 10], [0, 0])):
         (point,), twist = obstacle.polygon.points, obstacle.velocities.twist  # one point: a circle to TEB
         np.testing.assert_allclose([point.x, point.y], position_m, atol=1e-6)
         np.testing.assert_allclose([twist.linear.x, twist.linear.y], velocity_mps, atol=1e-9)
         assert obstacle.radius == pytest.approx(0.3)
+    assert walking.id == 3 and walking.header.frame_id == 'odom' and walking.orientation.w == 1
+    covariance = np.reshape(walking.velocities.covariance, (6, 6))
+    assert np.trace(covariance) == pytest.approx(0.6) and covariance[2, 2] == pytest.approx(0.3)
 
 
-def test_obstacles_have_id_and_velocity_covariance_and_float32_points():
-    """The points are exact only in a frame near the robot."""
-    position_m = np.array([448265.3, 5411934.25, 0.85])
-    tracks = [walker(3, position_m, [1, 0, 0])]
+def test_points_of_obstacles_are_exact_only_in_a_frame_near_the_robot():
+    """They are float32."""
+    tracks = [walker(3, [448265.3, 5411934.25, 0.85], [1, 0, 0])]
     for tracks, frame_id, error_m in ((tracks, 'map', 0.25), (in_frame(tracks, UTM), 'odom', 0.0)):
-        obstacle, = obstacles(tracks, frame_id).obstacles
-        point = obstacle.polygon.points[0]
+        point = obstacles(tracks, frame_id)[0].polygon.points[0]
         off_m = np.array([point.x, point.y, point.z]) - tracks[0].position_m
         assert np.abs(off_m).max() == pytest.approx(error_m, abs=1e-5)
-        assert obstacle.id == 3 and obstacle.header.frame_id == frame_id and obstacle.orientation.w == 1
-        covariance = np.reshape(obstacle.velocities.covariance, (6, 6))
-        assert np.trace(covariance) == pytest.approx(0.6) and covariance[2, 2] == pytest.approx(0.3)
 
 
 def test_mpc_planner_jackal_receives_everyone_with_radius_and_velocity():

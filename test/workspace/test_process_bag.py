@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import rosbag
 import tf2_ros
-from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.bags.bag_pipeline import process_bag
@@ -17,13 +16,14 @@ from ros_3d_bb.bags.bag_reader import BagError, BagReader
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.bags.bag_writer import session_images, write_bag
 from ros_3d_bb.bags.process_bag import main, with_params
-from ros_3d_bb.conversions.camera_msgs import START_NS
+from ros_3d_bb.conversions.camera_msgs import START_NS, transform_messages
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, time_from, tracks_from_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.pipeline.people_pipeline import Settings
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
+from support.bags import changed_bag, messages_in
 
 SCENE = {'duration': 1.5, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]},
                                                    {'start': [4.0, -0.8]}]}
@@ -44,25 +44,6 @@ def session_bag(session_folder, tmp_path):
     session = read_session(session_folder)
     session = session._replace(frames=session.frames[:5])
     return lambda with_boxes: write_bag(session_images(session, with_boxes=with_boxes), str(tmp_path / 'in.bag'))
-
-
-def messages_in(path):
-    """{topic: messages}."""
-    by_topic = {}
-    with rosbag.Bag(str(path)) as bag:
-        for topic, message, _time in bag.read_messages():
-            by_topic.setdefault(topic, []).append(message)
-    return by_topic
-
-
-def rewritten(source, target, change):
-    """Write a bag of the messages that `change(topic, message, time)` returns, (topic, message, time) or None."""
-    with rosbag.Bag(str(source)) as old, rosbag.Bag(str(target), 'w', compression='lz4') as new:
-        for entry in old.read_messages():
-            changed = change(*entry)
-            if changed is not None:
-                new.write(*changed)
-    return str(target)
 
 
 def run_tool(*arguments):
@@ -124,14 +105,15 @@ def test_without_detector_the_boxes_in_the_bag_are_used(session_bag, tmp_path):
 
 def test_names_without_a_slash_are_those_of_the_nodes(scene, tmp_path):
     """rosbag record stores the names of topics as they are given on its command line."""
-    recorded = rewritten(scene, tmp_path / 'in.bag', lambda topic, *rest: (topic[1:],) + rest)
+    recorded = changed_bag(scene, tmp_path / 'in.bag', lambda topic, *rest: (topic[1:],) + rest)
     process_bag(scene, str(tmp_path / 'expected.bag'), DEPTH)
     process_bag(recorded, str(tmp_path / 'out.bag'), DEPTH)
     assert messages_in(tmp_path / 'out.bag') == messages_in(tmp_path / 'expected.bag')
 
 
 def test_topics_can_be_remapped_and_a_missing_one_is_named(scene, tmp_path):
-    renamed = rewritten(scene, tmp_path / 'in.bag', lambda topic, *rest: (topic.replace('/camera/', '/front/'),) + rest)
+    renamed = changed_bag(scene, tmp_path / 'in.bag', lambda topic, *rest: (
+        topic.replace('/camera/', '/front/'),) + rest)
     with pytest.raises(BagError, match='did you mean /front/color/image_raw'):
         process_bag(renamed, str(tmp_path / 'out.bag'), DEPTH)
     remaps = ['%s:=%s' % (name, name.replace('camera/', 'front/')) for name in (
@@ -143,7 +125,7 @@ def test_topics_can_be_remapped_and_a_missing_one_is_named(scene, tmp_path):
 
 
 def test_without_transforms_the_summary_names_the_cause(scene, tmp_path):
-    rewritten(scene, tmp_path / 'in.bag', lambda topic, *rest: None if topic == '/tf' else (topic,) + rest)
+    changed_bag(scene, tmp_path / 'in.bag', lambda topic, *rest: None if topic == '/tf' else (topic,) + rest)
     result = run_tool(tmp_path / 'in.bag', tmp_path / 'out.bag', '--detector', 'depth')
     assert result.returncode == 0 and '15  no transform' in result.stdout
     assert result.stdout.splitlines()[-1].startswith('no tracks: no transform from camera_color_optical_frame to map')
@@ -157,7 +139,7 @@ def test_images_far_apart_need_the_tolerance_named_by_the_message(tmp_path):
             message.header.stamp -= genpy.Duration(0, 112 * NS // 1000)
         return topic, message, time
     write_bag(scenario_images(scenario_from(dict(SCENE, duration=0.1)), with_boxes=True), str(tmp_path / 'scene.bag'))
-    path, settings = rewritten(tmp_path / 'scene.bag', tmp_path / 'in.bag', older), Settings(detector='none')
+    path, settings = changed_bag(tmp_path / 'scene.bag', tmp_path / 'in.bag', older), Settings(detector='none')
     sentence = process_bag(path, str(tmp_path / 'out.bag'), settings).sentences['2D boxes rejected']
     tolerance_s = float(re.search(r'~stamp_tolerance: ([0-9.]+)', sentence).group(1))
     process_bag(path, str(tmp_path / 'out.bag'), with_params(settings, 'bbox3d', stamp_tolerance=tolerance_s))
@@ -171,7 +153,7 @@ def test_tracks_have_new_ids_after_a_jump_back_in_time(scene, tmp_path):
             for stamped in message.transforms if topic == '/tf' else [message]:
                 stamped.header.stamp = time_from(stamped.header.stamp.to_nsec() - 60 * NS)
         return topic, message, time
-    rewritten(scene, tmp_path / 'in.bag', change)
+    changed_bag(scene, tmp_path / 'in.bag', change)
     events = process_bag(str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'), DEPTH)
     assert events.counts['jumps back in time'] == 1 and 'no transform' not in events.counts
     tracks = messages_in(tmp_path / 'out.bag')['/ros_3d_bb/tracks']
@@ -184,17 +166,10 @@ def test_tracks_have_new_ids_after_a_jump_back_in_time(scene, tmp_path):
 def test_transforms_may_be_later_than_the_image_by_tf_timeout(scene, tmp_path):
     """A tenth of a second is within tf_timeout; half a second is not."""
     for delay_ns, is_known in ((NS // 10, True), (NS // 2, False)):
-        rewritten(scene, tmp_path / 'in.bag', lambda topic, message, time: (
+        changed_bag(scene, tmp_path / 'in.bag', lambda topic, message, time: (
             topic, message, time_from(time.to_nsec() + (delay_ns if topic == '/tf' else 0))))
         events = process_bag(str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'), DEPTH)
         assert ('no transform' not in events.counts) == is_known
-
-
-def transform_message(stamp_s, child):
-    transform = TransformStamped(child_frame_id=child)
-    transform.header.frame_id, transform.header.stamp = 'map', time_from(int(stamp_s * NS))
-    transform.transform.rotation.w = 1.0
-    return TFMessage([transform])
 
 
 def test_transforms_of_another_frame_with_old_stamps_change_nothing():
@@ -203,7 +178,8 @@ def test_transforms_of_another_frame_with_old_stamps_change_nothing():
     for number in range(100):
         now_s = 100 + number / 10
         for stamp_s, child in ((now_s, 'base'), (now_s, 'gps'), (now_s - 20, 'gps')):
-            transforms.add(transform_message(stamp_s, child))
+            stamp = time_from(int(stamp_s * NS))
+            transforms.add(TFMessage(transform_messages(stamp, [('map', child, np.eye(4))])))
         with pytest.raises(tf2_ros.TransformException):
             transforms.lookup('map', 'base', time_from(int((now_s + 0.1) * NS)))
     for number in range(99):

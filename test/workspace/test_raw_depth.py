@@ -1,7 +1,6 @@
 """Raw depth, registered by the pipeline: the same positions as depth that is aligned to colour."""
 import numpy as np
 import pytest
-import rosbag
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
@@ -21,6 +20,7 @@ from ros_3d_bb.pipeline.people_pipeline import Settings
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
+from support.bags import changed_bag, messages_in
 from support.launching import loaded
 from support.masterless import published
 
@@ -72,8 +72,7 @@ def bag(tmp_path_factory):
 
 def boxes_in(path):
     """The messages on ros_3d_bb/bb_3d, and the centres of their boxes, (n, 3)."""
-    with rosbag.Bag(str(path)) as found:
-        messages = [message for _topic, message, _time in found.read_messages(['/ros_3d_bb/bb_3d'])]
+    messages = messages_in(path, '/ros_3d_bb/bb_3d')['/ros_3d_bb/bb_3d']
     centers = [box.center.position for message in messages for box in message.boxes]
     return messages, np.array([(center.x, center.y, center.z) for center in centers])
 
@@ -107,18 +106,14 @@ def test_the_nodes_publish_the_same(bag, tmp_path):
     for node_class, params, topic in ((DepthDetectorNode, {}, BOXES_TOPIC), (Bbox3dNode, {}, BOXES3D_TOPIC),
                                       (TrackerNode, {'tf_timeout': 0.0}, TRACKS_TOPIC)):
         found = published(node_class, str(tmp_path / 'raw'), dict(params, depth='raw'), [topic])
-        with rosbag.Bag(str(tmp_path / 'raw')) as written:
-            expected = [message for _topic, message, _time in written.read_messages('/' + topic)]
+        expected = messages_in(tmp_path / 'raw', '/' + topic)['/' + topic]
         assert len(expected) == IMAGES and [str(message) for message in found[topic]] == list(map(str, expected))
 
 
 @pytest.mark.parametrize('unwanted,named', [(STATIC_TOPIC, (COLOR_FRAME, DEPTH_FRAME)),
                                             (RAW_INFO_TOPIC, ('/' + RAW_INFO_TOPIC,))])
 def test_what_registration_needs_is_named_if_it_is_missing(bag, tmp_path, unwanted, named):
-    with rosbag.Bag(bag) as old, rosbag.Bag(str(tmp_path / 'in.bag'), 'w') as new:
-        for topic, message, stamp in old.read_messages():
-            if topic != '/' + unwanted:
-                new.write(topic, message, stamp)
+    changed_bag(bag, tmp_path / 'in.bag', lambda topic, *rest: None if topic == '/' + unwanted else (topic,) + rest)
     events = process_bag(str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'), settings())
     assert events.counts['2D boxes rejected'] == IMAGES
     assert all(name in events.sentences['2D boxes rejected'] for name in named)

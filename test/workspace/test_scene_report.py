@@ -16,6 +16,7 @@ from ros_3d_bb_lab.evaluation.demo.scene_report import (BOXES_TOPIC, TRACKS_TOPI
                                                         write_csv, write_report)
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
+from support.bags import changed_bag
 
 SCENE = {'duration': 1.0, 'rate': 10.0, 'people': [{'start': [3.0, 1.0], 'moves': [{'to': [3.0, -1.0]}]}],
          'robot': {'moves': [{'to': [1.0, 0.0]}]}}
@@ -75,9 +76,7 @@ def test_a_missing_folder_of_the_table_is_named(bag, tmp_path, monkeypatch):
 def test_names_without_a_slash_are_read(bag, tmp_path):
     """rosbag record stores the names of topics as they are given on its command line."""
     path = str(tmp_path / 'recorded.bag')
-    with rosbag.Bag(bag) as old, rosbag.Bag(path, 'w') as new:
-        for topic, message, stamp in old.read_messages():
-            new.write(topic[1:], message, stamp)
+    changed_bag(bag, path, lambda topic, *rest: (topic[1:],) + rest)
     write_csv(path, str(tmp_path / 'tracks.csv'))
     assert len((tmp_path / 'tracks.csv').read_text().splitlines()) == 10
 

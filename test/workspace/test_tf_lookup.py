@@ -1,13 +1,13 @@
 """Transforms for several cameras, without a master."""
 import threading
 
+import numpy as np
 import pytest
 import rospy
 import tf2_ros
-from geometry_msgs.msg import TransformStamped
-from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
+from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.nodes.common import tf_lookup as module
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from support.masterless import masterless
@@ -26,9 +26,8 @@ def transforms():
 
 
 def link(parent, child, stamp=STAMP):
-    made = TransformStamped(header=Header(frame_id=parent, stamp=stamp), child_frame_id=child)
-    made.transform.rotation.w = 1.0
-    return made
+    message, = transform_messages(stamp, [(parent, child, np.eye(4))])
+    return message
 
 
 def why_not(transforms, camera):
