@@ -44,15 +44,6 @@ def test_variables_set_position_tilt_and_mesh(robot, monkeypatch):
     np.testing.assert_allclose(base_from_camera[:3, 0], (np.cos(0.5), 0, -np.sin(0.5)), atol=1e-12)  # tilted down
 
 
-def test_links_of_the_camera_form_a_tree_with_those_of_the_robot(robot):
-    description = robot()
-    links = [link.get('name') for link in description.findall('link')]
-    children = [joint.find('child').get('link') for joint in description.findall('joint')]
-    assert sorted(children + ['base_link']) == sorted(links)
-    assert {'camera_link', 'camera_color_frame', 'camera_color_optical_frame', 'camera_depth_frame',
-            'camera_depth_optical_frame'} == set(children)
-
-
 @pytest.mark.parametrize('stream', ['color', 'depth'])
 def test_optical_frames_are_at_the_position_in_the_thesis_and_face_forward(robot, stream):
     base_from_optical = base_from('camera_%s_optical_frame' % stream, robot())

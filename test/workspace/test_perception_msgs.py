@@ -188,16 +188,6 @@ def test_an_unusable_3d_box_does_not_affect_the_others(wrong):
     assert [(detection.index, detection.position_m[0]) for detection in detections] == [(0, -1.0), (2, 2.0)]
 
 
-@given(st.integers(0, 2 ** 32 - 1), st.floats(-6, 7.9), st.integers(1, 3))
-def test_covariances_are_usable_unless_a_variance_is_negative(seed, power, rank):
-    factor = np.random.RandomState(seed).normal(size=(3, rank))
-    covariance_m2 = factor.dot(factor.T) * 10 ** power / np.abs(factor.dot(factor.T)).max()
-    boxes = [box_of(covariance_m2=covariance_m2), box_of(covariance_m2=covariance_m2 - 3.1 * 10 ** power * np.eye(3))]
-    usable, faults = usable_boxes3d(BoundingBox3DArray(boxes=boxes))
-    np.testing.assert_array_equal(usable.pop(0).covariance_m2, covariance_m2)
-    assert not usable and len(faults) == 1
-
-
 def test_detections_are_upright_in_the_fixed_frame():
     """Width and depth of the cylinder are horizontal, its height is z; covariances are rotated."""
     detection = detection_of(box_of(0.6, 1.8, 0.5, 0.1, covariance_m2=np.diag([0.01, 0.04, 0.09])))
