@@ -11,6 +11,7 @@ from ros_3d_bb.conversions.image_msgs import imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
+from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from ros_3d_bb.visualization.image_overlay import VALID_COLOR
 from support.masterless import masterless
 from support.ros import depth_message
@@ -22,7 +23,7 @@ START_NS = 1000 * NS
 def connections():
     """A node that takes the depth of the person as it is."""
     with masterless({'estimator': 'median'}) as made:
-        Bbox3dNode()
+        made.node = Bbox3dNode()
         yield made
 
 
@@ -50,6 +51,12 @@ def test_boxes_without_a_stamp_get_the_image_that_arrived_before_them(connection
     connections.send(BOXES_TOPIC, Int32MultiArray(data=[20, 10, 44, 38]))
     message = connections.publishers[BOXES3D_TOPIC].newest
     assert message.header.stamp == time_from(stamp_ns) and message.boxes[0].center.position.z == pytest.approx(2.0)
+
+
+def test_a_changed_estimator_is_used_from_the_next_image(connections):
+    connections.node._reconfigure(Bbox3dParams(estimator='foreground'))
+    send_image(connections, START_NS)
+    assert 2.05 < connections.publishers[BOXES3D_TOPIC].newest.boxes[0].center.position.z < 2.15  # the axis
 
 
 def test_debug_images_are_published_while_they_have_subscribers(connections):

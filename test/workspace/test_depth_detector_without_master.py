@@ -5,7 +5,9 @@ import pytest
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, boxes2d_from_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
+from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
+from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
@@ -15,12 +17,13 @@ STAMP_NS = 1000 * NS
 PEOPLE = [{'start': [4.0, 0.8], 'facing': 3.1, 'height': 1.8}, {'start': [5.0, -0.9], 'facing': 1.6, 'height': 1.7}]
 
 
-def answer(frame_id='camera_color_optical_frame', **scenario):
+def answer(frame_id='camera_color_optical_frame', changed=DepthPeopleParams(), **scenario):
     """The boxes and the annotated image of one image, the counts of the node, and the true boxes."""
     simulator = Simulator(scenario_from(dict({'rate': 10.0, 'people': PEOPLE}, **scenario)))
     frame = simulator.frame(0)
     with masterless() as connections:
         node = DepthDetectorNode()
+        node._reconfigure(DepthDetectorParams(), changed)
         for topic, message in simulated_messages(simulator, frame, STAMP_NS):
             topic = '/tf' if topic == 'tf' else topic
             if topic != '/tf':
@@ -41,6 +44,11 @@ def test_people_are_detected_with_stamp_and_frame_of_the_image(frame_id):
     assert all(iou(np.array(box, float), found.boxes.astype(float)).max() > 0.5 for box in true_boxes)
     assert set(found.labels) == {'person'} and (found.scores > 0).all()
     assert ('tilt of the camera unknown' in counts) == (frame_id == 'unknown_to_tf')
+
+
+def test_a_changed_range_applies_from_the_next_image_on():
+    """One of the people is 4 m away and one 5 m."""
+    assert len(boxes2d_from_msg(answer(changed=DepthPeopleParams(max_depth=4.5))[0]).boxes) == 1
 
 
 def test_nothing_is_published_while_no_floor_is_known():

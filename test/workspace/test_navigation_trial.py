@@ -1,18 +1,16 @@
 """The benchmark of navigation: what each mode starts, and one trial under roslaunch."""
-import argparse
 import json
 import subprocess
 import sys
 
 import pytest
 
-from ros_3d_bb_lab.evaluation.navigation.benchmark import MODES, run_trial
+from ros_3d_bb_lab.evaluation.navigation.benchmark import MODES
 from support.launching import loaded
 from support.processes import processes_naming
 from support.real_planners import planner_environment
 
 ARGUMENTS = ['scenario:=/some/scene.yaml', 'record:=/some/record.json']
-OPTIONS = argparse.Namespace(planner='dwa', detector='exact', rate=10.0)
 SEPARATE = {'bbox3d_node', 'tracker_node'}
 PIPELINE = {'ours': SEPARATE, 'limited': SEPARATE, 'thesis': {'people_node'}}
 
@@ -42,19 +40,6 @@ def test_a_detector_replaces_the_true_boxes_and_a_trial_runs_with_teb():
     parameters, nodes = loaded('navigation_benchmark.launch', 'detector:=depth', 'local_planner:=teb', *ARGUMENTS)
     assert not parameters['/simulator_node/boxes'] and 'depth_detector_node' in nodes
     assert parameters['/move_base/base_local_planner'] == 'teb_local_planner/TebLocalPlannerROS'
-
-
-def test_a_recorded_trial_is_not_repeated(tmp_path, monkeypatch):
-    started = []
-    monkeypatch.setattr('ros_3d_bb_lab.evaluation.navigation.benchmark.launch',
-                        lambda *arguments: started.append(arguments))
-    (tmp_path / 'standing-ours-3.json').write_text('{"collisions": 0}')
-    assert run_trial(('standing', 'ours', 3, str(tmp_path), OPTIONS)) == {
-        'scene': 'standing', 'mode': 'ours', 'seed': 3, 'collisions': 0}
-    assert not started
-    with pytest.raises(RuntimeError, match='standing, ours, seed 4: no result'):
-        run_trial(('standing', 'ours', 4, str(tmp_path), OPTIONS))
-    assert len(started) == 1
 
 
 @pytest.mark.long

@@ -65,14 +65,6 @@ def test_the_command_prints_the_table_and_writes_the_image_next_to_the_bag(bag):
     assert '<td>0.200 m</td>' in page and 'src="data:image/png;base64,' in page and 'http' not in page
 
 
-def test_a_missing_folder_of_the_table_is_named(bag, tmp_path, monkeypatch):
-    table = str(tmp_path / 'no such folder' / 'table.csv')
-    monkeypatch.setattr('sys.argv', ['scene_report', bag, str(tmp_path / 'picture'), '--csv', table])
-    with pytest.raises(SystemExit, match='no table was written'):
-        main()
-    assert sorted(os.listdir(str(tmp_path))) == ['picture.html', 'picture.png']
-
-
 def test_names_without_a_slash_are_read(bag, tmp_path):
     """rosbag record stores the names of topics as they are given on its command line."""
     path = str(tmp_path / 'recorded.bag')

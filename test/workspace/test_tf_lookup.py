@@ -16,6 +16,17 @@ STAMP = rospy.Time(100)
 CAMERAS = 'front', 'rear'
 
 
+def test_the_transform_is_that_of_the_stamp():
+    """The robot drives on while an image waits for its boxes."""
+    with masterless() as connections:
+        transforms = Transforms(wait_s=0.0)
+        for number in range(2):
+            sent = link('map', 'base_link', STAMP + rospy.Duration(number))
+            sent.transform.translation.x = number
+            connections.send('/tf', TFMessage([sent]))
+        assert transforms.lookup('map', 'base_link', STAMP + rospy.Duration(0.5))[0, 3] == 0.5
+
+
 @pytest.fixture
 def transforms():
     """tf knows neither camera."""
