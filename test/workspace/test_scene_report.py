@@ -65,14 +65,6 @@ def test_the_command_prints_the_table_and_writes_the_image_next_to_the_bag(bag):
     assert '<td>0.200 m</td>' in page and 'src="data:image/png;base64,' in page and 'http' not in page
 
 
-def test_names_without_a_slash_are_read(bag, tmp_path):
-    """rosbag record stores the names of topics as they are given on its command line."""
-    path = str(tmp_path / 'recorded.bag')
-    changed_bag(bag, path, lambda topic, *rest: (topic[1:],) + rest)
-    write_csv(path, str(tmp_path / 'tracks.csv'))
-    assert len((tmp_path / 'tracks.csv').read_text().splitlines()) == 10
-
-
 def test_without_ground_truth_the_tracks_are_listed(tmp_path):
     path = str(tmp_path / 'tracked.bag')
     write_bag(((stamp_ns, [pair for pair in messages if pair[0] != 'ground_truth'])
@@ -84,7 +76,9 @@ def test_without_ground_truth_the_tracks_are_listed(tmp_path):
 
 
 def test_tracks_are_written_as_a_table(bag, tmp_path):
-    write_csv(bag, str(tmp_path / 'tracks.csv'))
+    """Also of a bag of rosbag record, which stores the names of topics as they are given on its command line."""
+    changed_bag(bag, tmp_path / 'in.bag', lambda topic, *rest: (topic[1:],) + rest)
+    write_csv(str(tmp_path / 'in.bag'), str(tmp_path / 'tracks.csv'))
     with open(str(tmp_path / 'tracks.csv'), newline='') as stream:
         rows = list(csv.DictReader(stream))
     assert [(row['id'], row['label'], row['status']) for row in rows] == [('7', 'person', '0')] * 9
