@@ -162,7 +162,7 @@ def test_the_driver_aligns_depth_to_colour_of_the_same_size_and_rate(camera_pack
     assert parameters['/front/rgb_camera/exposure'] == 80
 
 
-def test_the_camera_for_measurements_aligns_depth_and_its_frame_is_the_target(camera_package):
+def test_a_measured_camera_aligns_depth_and_its_frame_is_the_target(camera_package):
     parameters = dumped('measure.launch', camera_package, 'camera:=true', 'detector:=depth', 'session:=/a')
     assert given_to_stand_ins(parameters)['align_depth'] == 'true'
     assert parameters['/tracker_node/target_frame'] == 'camera_link'

@@ -139,7 +139,7 @@ def test_new_parameters_apply_to_the_next_image():
     assert all(marker.lifetime.to_sec() == 0.5 for marker in markers.markers if marker.action == Marker.ADD)
 
 
-def test_ignored_areas_are_closed_outlines_on_the_floor_until_they_are_removed():
+def test_ignored_areas_are_outlines_on_the_floor_until_removed():
     writer = MarkerWriter(MarkerParams())
     writer.areas_m = [np.array([[1.0, 2.0], [3.0, 2.0], [3.0, 4.0]])]
     marker, = writer.write([], header(SECOND_NS)).markers

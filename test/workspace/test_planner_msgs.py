@@ -55,7 +55,7 @@ def obstacles(tracks, frame_id='map'):
     return sent(obstacles_to_msg, 'costmap_converter', tracks, frame_id).obstacles
 
 
-def test_obstacles_are_circles_where_people_are_now_with_velocities_of_the_frame():
+def test_obstacles_are_circles_where_people_are_now():
     """TEB takes positions as of now, and transforms them into its frame, but not velocities. The image is 0.3 s old."""
     tracks = predicted_to([walker(3, [1, 2, 0.9], [1.2, 0, 0]), walker(4, [5, 5, 0.9], [0, 0, 0])], 0.3)
     walking, standing = obstacles(in_frame(tracks, QUARTER), 'odom')
@@ -169,7 +169,7 @@ def test_the_costmap_needs_no_package_and_no_ring_where_its_range_is_zero():
     assert [output.topic for output in outputs_from(PlannerBridgeParams(clearing_range=0.0))] == ['~points', '~costs']
 
 
-def test_the_shipped_costmap_clears_within_the_ring_and_stops_without_people():
+def test_the_shipped_costmap_clears_within_the_ring_and_times_out():
     """The limits of time are shorter than `timeout`, after which the points are emptied."""
     with open(os.path.join(ROOT, 'config', 'move_base', 'local_costmap.yaml')) as stream:
         layer = yaml.safe_load(stream)['people_layer']

@@ -68,7 +68,7 @@ def test_static_transforms_and_those_between_equal_frames_do_not_age():
         assert robot.forwarded(START_NS + 600 * NS, frame_id='/base_link') == 1.0
 
 
-def test_the_robot_stops_before_the_whole_length_of_a_bicycle_seen_from_the_front():
+def test_the_robot_stops_before_the_whole_length_of_a_bicycle():
     """Its length is 1.75 m, half of which, and the robot and the clearance, leave 1.175 m."""
     standing = track_at([2.5, 0, 0.5], [0, 0, 0], moving=False)
     bicycle = standing._replace(label='bicycle', size_m=np.array([0.6, 0.6, 1.1]))
