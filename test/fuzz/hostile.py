@@ -5,20 +5,18 @@ import random
 import genpy
 import numpy as np
 from geometry_msgs.msg import Point, Pose, Quaternion, Transform, TransformStamped, Twist, Vector3
-from sensor_msgs.msg import CompressedImage, Image, LaserScan
+from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, CameraFrame, messages_of
-from ros_3d_bb.conversions.image_msgs import fill_image
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS, CameraFrame, messages_of
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg,
                                                    time_from)
 from ros_3d_bb.conversions.planner_msgs import points_to_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
-from support.compressed import compressed_fields
 from support.masterless import on_the_wire
 from support.planners import person
 
@@ -28,8 +26,6 @@ TEXTS = ('', 'camera', 'map', '/camera', 'no_such_frame', 'a b', '\u00e4\u0661',
          'dog', 'do\x07g', ';classes=dog,', ';scores=nan', 'stamp=1.000000000;stamp=x', 'rgb8', '16UC1', 'bayer_rggb8',
          'jpeg', 'plumb_bob', 'equidistant')
 WIDTH, HEIGHT = 64, 48
-CODECS = {COLOR_TOPIC: ('jpeg', 'png'), DEPTH_TOPIC: ('png', 'compressedDepth', 'compressedDepth rvl', 'metres')}
-CODECS['~depth'] = CODECS[DEPTH_TOPIC]
 CAMERA = Camera(WIDTH, HEIGHT, 60.0, 60.0, 31.5, 23.5)
 
 
@@ -86,26 +82,13 @@ def transforms(stamp_ns):
     return message
 
 
-def damaged(source, topic, message, now_ns):
-    """A copy of a valid message of a topic, in which up to two fields of it or of its parts have other values.
-
-    Images may be compressed before, or be depth in metres with extreme values.
-    """
-    if topic in CODECS and source.random() < 0.5:
-        message = _in_another_form(source, message, source.choice(CODECS[topic]))
+def damaged(source, message, now_ns):
+    """A copy of a valid message, in which up to two fields of it or of its parts have other values."""
     message = on_the_wire(message)
     for _fault in range(source.choice((0, 1, 1, 2))):
         part, name, kind = source.choice(list(_fields(message)))
         setattr(part, name, _other(source, kind, getattr(part, name), now_ns))
     return message
-
-
-def _in_another_form(source, image, codec):
-    if codec != 'metres':
-        return CompressedImage(**compressed_fields(image, codec))
-    with np.errstate(over='ignore'):
-        values = np.array([source.choice(FLOATS) for _column in range(16)]).astype(np.float32)
-    return fill_image(Image(header=image.header), np.resize(values, (image.height, image.width)), '32FC1')
 
 
 def _fields(message):

@@ -25,19 +25,6 @@ from support.masterless import masterless, on_the_wire
 
 START_NS, PERIOD_NS = 1000 * NS, NS // 30
 EVERY = 200  # images between checks with valid messages
-WAITING = 103  # inputs without an outcome: capacity of `StampSynchronizer` and the worker
-# Counters of the input of a node: received, published, and reasons for not being published.
-OUTCOMES = {
-    'yolov5_node': ('colour images received', 'images processed', 'colour images rejected', 'images rejected',
-                    'images skipped for a newer one', 'images while paused', 'detections failed'),
-    'depth_detector_node': ('colour images received', 'images processed', 'colour images rejected',
-                            'colour images from before a time jump', 'images rejected',
-                            'images skipped for a newer one', 'images without floor', 'images while paused',
-                            'detections failed'),
-    'bbox3d_node': ('2D boxes received', 'images estimated', '2D boxes rejected', '2D boxes from before a time jump'),
-    'tracker_node': ('3D boxes received', 'images tracked', '3D boxes rejected', 'no transform',
-                     'images behind other cameras', 'images ahead of other cameras'),
-    'planner_bridge_node': ('tracks received', 'tracks forwarded', 'tracks rejected')}
 
 
 class Target(NamedTuple):
@@ -84,17 +71,17 @@ TARGETS = {
     'viewer_node': Target(lambda _source: ViewerNode(), {'window': False}, '')}
 
 
-def fuzz_node(name, seed, count, deadline_s=float('inf')):
-    """Send invalid messages to a node until a number of messages, or a time on time.monotonic().
+def fuzz_node(name, seed, count):
+    """Send this number of messages, or more, to a node, many of them invalid.
 
     Returns the number of messages and the CPU time in seconds. Raises what a callback raised, and AssertionError if
-    valid messages do not work afterwards, or a message has no outcome in the counters of the node.
+    valid messages do not work afterwards.
     """
     source, target, sent, began_s = hostile.Source(seed), TARGETS[name], 0, time.process_time()
     with masterless(target.params) as connections, _quiet():
         node = target.make(source)
         now_ns = START_NS
-        while sent < count and time.monotonic() < deadline_s:
+        while sent < count:
             for _round in range(EVERY):
                 now_ns += PERIOD_NS
                 connections.now = time_from(now_ns)
@@ -112,10 +99,6 @@ def fuzz_node(name, seed, count, deadline_s=float('inf')):
                 for _period_s, timer in connections.timers:
                     timer(None)
             now_ns = _check_valid(name, node, connections, now_ns)
-            if name in OUTCOMES:
-                counts = {counter: node._diagnostics.totals().get(counter, 0) for counter in OUTCOMES[name]}
-                received, *outcomes = counts.values()
-                assert 0 <= received - sum(outcomes) <= WAITING, '%s: inputs and outcomes: %s' % (name, counts)
     return sent, time.process_time() - began_s
 
 
@@ -132,7 +115,7 @@ def _messages_of(source, now_ns, connections):
     good = hostile.good_messages(now_ns)
     topics = [topic for topic in sorted(connections.subscribers) if topic in good]
     source.shuffle(topics)
-    return [(topic, good[topic] if source.random() < 0.4 else hostile.damaged(source, topic, good[topic], now_ns))
+    return [(topic, good[topic] if source.random() < 0.4 else hostile.damaged(source, good[topic], now_ns))
             for topic in topics]
 
 

@@ -11,7 +11,6 @@ import pytest
 import rospy
 from gazebo_msgs.msg import ModelStates
 from geometry_msgs.msg import PoseStamped
-from sensor_msgs.msg import CameraInfo, Image
 
 from ros_3d_bb.msg import TrackedObjectArray
 from support.processes import end, processes_naming
@@ -28,9 +27,6 @@ class World(object):
     def __init__(self):
         self.fps, self.truth = FPS, []  # (time in s, {name: (2,)}, yaw of the robot)
         rospy.Subscriber('gazebo/model_states', ModelStates, self._on_states, queue_size=1, buff_size=2 ** 20)
-        self.color = Recorder('camera/color/image_raw', Image, publisher_expected=False)
-        self.depth = Recorder('camera/aligned_depth_to_color/image_raw', Image, publisher_expected=False)
-        self.info = Recorder('camera/color/camera_info', CameraInfo, publisher_expected=False)
         self.tracks = Recorder('ros_3d_bb/tracks', TrackedObjectArray, publisher_expected=False)
         self.goal = rospy.Publisher('move_base_simple/goal', PoseStamped, queue_size=1)
 

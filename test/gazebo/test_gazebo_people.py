@@ -23,18 +23,6 @@ def people(start):
         yield world
 
 
-def test_images_have_the_frame_size_encoding_and_rate_of_the_robot(people):
-    for recorder, encoding in ((people.color, 'rgb8'), (people.depth, '32FC1')):
-        recorder.emptied()
-        first, second = recorder.wait_for(2, 600)
-        assert (first.header.frame_id, first.encoding) == ('camera_color_optical_frame', encoding)
-        assert (first.width, first.height) == (640, 480)
-        assert (second.header.stamp - first.header.stamp).to_sec() == pytest.approx(1 / people.fps, abs=0.01)
-    assert set(map(stamp_of, people.color.messages)) & set(map(stamp_of, people.info.messages))
-    np.testing.assert_allclose(np.reshape(people.info.messages[-1].K, (3, 3)),
-                               [[614.7, 0, 319.5], [0, 614.7, 239.5], [0, 0, 1]], atol=0.1)
-
-
 def test_each_person_is_tracked_at_the_true_position(people):
     people.tracks.emptied()
     people.pass_s(ROUND_S)

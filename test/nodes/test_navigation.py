@@ -155,7 +155,7 @@ def test_the_robot_stops_when_a_node_ends_and_drives_on_when_it_is_back(drives, 
 
 
 @pytest.mark.parametrize('robot', ['teb'], indirect=True)
-def test_teb_drives_past_people_who_are_obstacles_and_stops_when_the_camera_stops(drives):
+def test_teb_drives_past_people_and_stops_when_the_camera_stops(drives):
     obstacles = Recorder('planner_bridge_node/obstacles', message_class('costmap_converter/ObstacleArrayMsg'))
     person_m, nearest_m = drives.place_m + [4.0, 0.1], 10.0  # in the way
     drives.people = lambda _seconds: person_m[None]

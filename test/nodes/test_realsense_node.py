@@ -64,8 +64,7 @@ def test_the_frames_of_the_camera_are_published_once_and_form_a_tree(played):
     np.testing.assert_allclose(ahead, (1, 0, 0), atol=1e-12)
 
 
-@pytest.mark.parametrize('param, reason', [('file:=/nowhere.bag', '/nowhere.bag'), ('fps:=0', '~fps is 0')])
-def test_a_node_that_cannot_start_exits_with_the_reason(recording, param, reason):
-    process = started('realsense_node', param)
+def test_a_node_that_cannot_start_exits_with_the_reason(recording):
+    process = started('realsense_node', 'file:=/nowhere.bag')
     output, _none = process.communicate(timeout=30)
-    assert process.returncode == 1 and reason in output and 'Traceback' not in output
+    assert process.returncode == 1 and '/nowhere.bag' in output and 'Traceback' not in output

@@ -1,58 +1,117 @@
-"""simulation.launch as in `./run demo`: the bag of a scene. Needs a master and simulated time."""
+"""simulation.launch as in `./run demo`, with one and with two cameras, and the time of simulator_node. Needs a master.
+
+The scene with two cameras is about the names of all nodes and topics together; test_cameras.py compares its tracks with
+the truth.
+"""
+import contextlib
+import os
+
 import pytest
 import rosbag
 import rospy
+import yaml
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import CameraInfo, Image
+from tf2_msgs.msg import TFMessage
 
+from ros_3d_bb.conversions.perception_msgs import stamp_of
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb_lab.evaluation.clear_mot import score
 from ros_3d_bb_lab.evaluation.demo.scene_report import read_recording
-from support.ros import launched
+from support.ros import Recorder, launched, started, wait_until
 
-SCENE = """
-duration: 4.0
-rate: 10.0
-people:
-- {start: [4.0, 0.9], facing: 3.0, moves: [{to: [4.0, -0.6], speed: 0.8}]}
-- {start: [5.2, -0.8], facing: 2.0}
-robot: {moves: [{to: [0.4, 0.0], speed: 0.2}]}
-"""
+SCENE = {'duration': 4.0, 'rate': 10.0, 'robot': {'moves': [{'to': [0.4, 0.0], 'speed': 0.2}]}, 'people': [
+    {'start': [4.0, 0.9], 'facing': 3.0, 'moves': [{'to': [4.0, -0.6], 'speed': 0.8}]},
+    {'start': [5.2, -0.8], 'facing': 2.0}]}
+TWO_CAMERAS = os.path.join(os.path.dirname(__file__), '..', '..', 'config', 'scenarios', 'two_cameras.yaml')
+RATE = 15
+COLOR = 'camera/color/image_raw'
+TOPICS = {'camera/aligned_depth_to_color/image_raw': Image, 'camera/color/camera_info': CameraInfo,
+          'camera/aligned_depth_to_color/camera_info': CameraInfo, '/tf': TFMessage, '/clock': Clock,
+          'ground_truth': TrackedObjectArray}
+IMAGE_TOPICS = {COLOR} | set(TOPICS) - {'/tf', '/clock'}
 
 
-@pytest.fixture(scope='module')
-def bag(tmp_path_factory):
-    """Bag of a run, in a folder with a space in its name."""
+@pytest.fixture(scope='module', autouse=True)
+def node():
     rospy.init_node('test_simulation')
-    folder = tmp_path_factory.mktemp('a scene')
-    (folder / 'scene.yaml').write_text(SCENE)
+
+
+def recorded(folder, scene, *arguments):
+    """Bag of a run of a scene, in a folder with a space in its name."""
+    folder = folder / 'a scene'
+    folder.mkdir()
+    (folder / 'scene.yaml').write_text(yaml.safe_dump(scene))
     path = str(folder / 'run.bag')
     with launched('simulation.launch', 'scenario:=%s' % (folder / 'scene.yaml'), 'record:=' + path, 'rviz:=false',
-                  'repeat:=false', 'wait_for_subscribers:=2') as process:
-        assert process.wait(timeout=120) == 0
+                  'repeat:=false', *arguments) as process:
+        assert process.wait(timeout=180) == 0
     return path
 
 
-def test_all_people_are_tracked_until_the_end_of_the_scene(bag):
-    with rosbag.Bag(bag) as opened:
-        result = score(read_recording(opened).moments)
-    assert result.images > 30
-    assert [person.person for person in result.people] == [1, 2]
+def test_all_people_are_tracked_until_the_end_of_the_scene(tmp_path):
+    with rosbag.Bag(recorded(tmp_path, SCENE, 'wait_for_subscribers:=2')) as bag:
+        result, topics = score(read_recording(bag).moments), set(bag.get_type_and_topic_info().topics)
+        boxes = [box for _topic, message, _time in bag.read_messages(['/ros_3d_bb/bb_3d']) for box in message.boxes]
+    assert result.images > 30 and [person.person for person in result.people] == [1, 2]
     for person in result.people:
         assert len(person.ids) == 1 and person.followed > 0.6 and person.rmse_m < 0.25, person
     assert result.false_share < 0.1
-
-
-def test_the_bag_has_the_topics_for_playback(bag):
-    with rosbag.Bag(bag) as opened:
-        topics = opened.get_type_and_topic_info().topics
     assert {'/camera/color/image_raw', '/camera/aligned_depth_to_color/image_raw', '/camera/color/camera_info', '/tf',
             '/ground_truth', '/yolo_bounding_box', '/ros_3d_bb/bb_3d', '/ros_3d_bb/tracks',
-            '/visualization_marker_array'} <= set(topics)
-    assert not {'/ros_3d_bb/color', '/yolo_result_out'} & set(topics)
+            '/visualization_marker_array'} <= topics  # those for playback
+    assert not {'/ros_3d_bb/color', '/yolo_result_out'} & topics
+    assert len(boxes) > 30 and all(0.01 ** 2 < variance < 0.5 ** 2  # those of the simulated camera
+                                   for box in boxes for variance in box.position_covariance[0::4])
 
 
-def test_boxes_have_the_covariance_of_the_simulated_camera(bag):
-    with rosbag.Bag(bag) as opened:
-        boxes = [box for _topic, message, _time in opened.read_messages(['/ros_3d_bb/bb_3d']) for box in message.boxes]
-    assert len(boxes) > 30
-    for box in boxes:
-        variances = box.position_covariance[0::4]
-        assert 0.01 ** 2 < min(variances) and max(variances) < 0.5 ** 2
+def test_each_camera_has_its_topics_and_the_tracks_have_one(tmp_path):
+    """The first seconds of the scenario, with five images a second from each camera."""
+    with open(TWO_CAMERAS) as stream:
+        scene = yaml.safe_load(stream)
+    room = os.path.join(os.path.dirname(os.path.realpath(TWO_CAMERAS)), scene['room'])
+    path = recorded(tmp_path, dict(scene, room=room, duration=4.0), 'cameras:=front, left', 'rate:=5.0')
+    with rosbag.Bag(path) as bag:
+        topics = set(bag.get_type_and_topic_info().topics)
+        stamps = [stamp_of(message) for _topic, message, _time in bag.read_messages('/ros_3d_bb/tracks')]
+    for camera in ('front', 'left'):
+        assert {'/%s/%s' % (camera, name) for name in (
+            'color/image_raw', 'aligned_depth_to_color/image_raw', 'color/camera_info', 'yolo_bounding_box',
+            'ros_3d_bb/bb_3d')} <= topics
+    assert {'/ros_3d_bb/tracks', '/visualization_marker_array'} <= topics
+    assert len(stamps) > 10 and stamps == sorted(stamps)
+
+
+def test_time_and_tf_are_published_every_20_ms_and_at_the_images(tmp_path):
+    """All messages of an image have its stamp. The scene starts once all recorders are connected."""
+    (tmp_path / 'scene.yaml').write_text(yaml.safe_dump(dict(SCENE, duration=1.0, rate=float(RATE))))
+    with contextlib.ExitStack() as stack:
+        recorders = {topic: stack.enter_context(Recorder(topic, kind, publisher_expected=False))
+                     for topic, kind in TOPICS.items()}
+        process = started('simulator_node', 'publish_clock:=true', 'repeat:=false', 'wait_for_subscribers:=1',
+                          'scenario:=%s' % (tmp_path / 'scene.yaml'))
+        wait_until(lambda: all(recorder.is_connected for recorder in recorders.values()), 'all connections')
+        recorders[COLOR] = stack.enter_context(Recorder(COLOR, Image))  # the subscriber that the node waits for
+        assert process.wait(timeout=60) == 0
+        wait_until(lambda: all(len(recorders[topic].messages) == RATE for topic in IMAGE_TOPICS), 'all images')
+    stamps = [message.header.stamp for message in recorders[COLOR].messages]
+    images_ns = [int(round(number / RATE * NS)) for number in range(RATE)]
+    assert [(stamp - stamps[0]).to_nsec() for stamp in stamps] == images_ns
+    for topic in IMAGE_TOPICS:
+        assert [message.header.stamp for message in recorders[topic].messages] == stamps
+    transforms = [message.transforms for message in recorders['/tf'].messages]
+    assert [[link.child_frame_id for link in links] for links in transforms] == [
+        ['odom', 'base_link', 'camera_color_optical_frame']] * len(transforms)
+    times_ns = [(links[0].header.stamp - stamps[0]).to_nsec() for links in transforms]
+    assert times_ns == sorted(set(range(0, NS + 1, NS // 50)) | set(images_ns))
+    clock_ns = [(message.clock - stamps[0]).to_nsec() for message in recorders['/clock'].messages]
+    assert clock_ns == sorted(clock_ns) and clock_ns[-len(times_ns):] == times_ns
+
+
+@pytest.mark.parametrize('params, reason', [
+    ((), 'no scenario given'), (('scenario:=/nowhere.yaml',), '/nowhere.yaml'),
+    (('scenario:=x', 'speed:=2.0'), 'publish_clock')])
+def test_invalid_parameters_are_rejected_at_the_start(params, reason):
+    output, _none = started('simulator_node', *params).communicate(timeout=30)
+    assert reason in output and 'Traceback' not in output

@@ -6,15 +6,13 @@ import sys
 import numpy as np
 import pytest
 import rosbag
-import tf2_ros
 
 from conftest import DATA
 from ros_3d_bb.bags.bag_writer import START_NS, session_images, session_to_bag, write_bag
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
-from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, camera_from_msg, time_from,
-                                                   tracks_from_msg, transform_from_msg)
+from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, camera_from_msg, time_from, tracks_from_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.depth.ground_plane import fit_floor
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
@@ -94,17 +92,10 @@ def scene(tmp_path_factory):
     return Simulator(scenario_from(SCENE)), messages_in(path)
 
 
-def test_a_scene_has_the_topics_of_a_robot_and_the_truth(scene):
-    _simulator, messages = scene
-    assert set(messages) == {'/camera/color/image_raw', '/camera/aligned_depth_to_color/image_raw', '/tf',
-                             '/camera/color/camera_info', '/camera/aligned_depth_to_color/camera_info', '/ground_truth'}
-    assert [message.header.stamp.to_nsec() - START_NS for message in messages['/ground_truth']] == [
-        number * NS // 10 for number in range(5)]
-    assert set(message.header.frame_id for message in messages['/ground_truth']) == {'map'}
-
-
 def test_a_scene_contains_the_images_of_the_simulator(scene):
     simulator, messages = scene
+    assert [message.header.stamp.to_nsec() - START_NS for message in messages['/ground_truth']] == [
+        number * NS // 10 for number in range(5)]
     for number in (0, 4):
         frame = simulator.frame(number)
         np.testing.assert_array_equal(imgmsg_to_rgb(messages['/camera/color/image_raw'][number]), frame.color)
@@ -117,19 +108,6 @@ def test_a_scene_contains_the_images_of_the_simulator(scene):
         assert (written.id, written.status, written.moving) == (person.id, person.status, person.moving)
         for field in ('position_m', 'velocity_mps', 'size_m', 'prediction_m'):
             np.testing.assert_allclose(getattr(written, field), getattr(person, field), atol=1e-12)
-
-
-def test_the_transforms_of_a_scene_connect_map_and_camera(scene):
-    simulator, messages = scene
-    buffer = tf2_ros.BufferCore()
-    for message in messages['/tf']:
-        for transform in message.transforms:
-            buffer.set_transform(transform, 'test')
-    for number in range(5):
-        found = buffer.lookup_transform_core('map', 'camera_color_optical_frame',
-                                             messages['/ground_truth'][number].header.stamp)
-        np.testing.assert_allclose(transform_from_msg(found),
-                                   simulator.poses_at(simulator.time_s(number)).map_from_camera, atol=1e-9)
 
 
 @pytest.mark.parametrize('text,option,named', [

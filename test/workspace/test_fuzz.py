@@ -2,11 +2,10 @@
 import genpy
 import numpy as np
 import pytest
-from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from fuzz.hostile import good_messages, transforms
-from fuzz.nodes import TARGETS, fuzz_node, send_image
+from fuzz.nodes import TARGETS, fuzz_node
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC as COLOR, DEPTH_TOPIC as DEPTH, INFO_TOPICS
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC as BOXES
 from ros_3d_bb.core.time_sync import NS
@@ -55,13 +54,3 @@ def test_boxes_are_processed_even_if_the_colour_image_is_invalid():
             for topic in order:
                 connections.send(topic, messages[topic])
         assert connections.publishers['ros_3d_bb/bb_3d'].count == 3
-
-
-def test_debug_images_are_published_after_a_colour_image_without_a_stamp():
-    """Colour images are subscribed only while the debug images have subscribers."""
-    with masterless() as connections:
-        Bbox3dNode()
-        for stamp_ns in (10 ** 12, 2 * 10 ** 12):
-            send_image(connections, stamp_ns)
-            connections.send(COLOR, Image())
-        assert connections.publishers['ros_3d_bb/color'].count == 1

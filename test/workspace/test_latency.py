@@ -8,7 +8,6 @@ import sys
 import pytest
 
 from ros_3d_bb.bags.bag_writer import write_bag
-from ros_3d_bb_lab.evaluation.latency.rospy_limit import topics_of
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from support.processes import processes_naming
@@ -16,55 +15,23 @@ from support.processes import processes_naming
 NODES = {'replay_node', 'latency_probe_node', 'bbox3d_node', 'tracker_node'}
 
 
-@pytest.fixture(scope='module')
-def bag(tmp_path_factory):
-    """Half a second of two standing people, with their 2D boxes."""
+def test_results_are_written_and_no_process_remains(tmp_path):
+    """On half a second of two standing people, with their 2D boxes. Processes of nodes name the folder of the log."""
     people = [{'start': [3.0, 0.6], 'facing': 3.1}, {'start': [4.0, -0.7], 'facing': 3.1}]
     scenario = scenario_from({'duration': 0.4, 'rate': 20.0, 'robot': {}, 'people': people})
-    path = str(tmp_path_factory.mktemp('latency') / 'images.bag')
-    assert write_bag(scenario_images(scenario, with_boxes=True), path, 'none') == 8
-    return path
-
-
-@pytest.fixture
-def benchmark(tmp_path):
-    """Starts the benchmark as a separate process; the command lines of its nodes contain the log folder `tmp_path`.
-
-    The process handles SIGINT even if this one ignores it, as the background jobs of a script do.
-    """
-    environment = dict(os.environ, ROS_HOSTNAME='localhost', ROS_LOG_DIR=str(tmp_path))
-
-    def start(*arguments):
-        return subprocess.Popen([sys.executable, '-m', 'ros_3d_bb_lab.evaluation', 'latency'] + list(arguments),
-                                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True,
-                                env=environment, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
-    return start
-
-
-def test_results_are_written_and_no_process_remains(bag, benchmark, tmp_path):
-    results = str(tmp_path / 'latency.json')
-    process = benchmark('--bag', bag, '--cases', 'free', '--seconds', '5', '--rate', '10', '--separate', '--limits',
-                        '--json', results)
-    printed, _nothing = process.communicate()
-    assert process.returncode == 0, printed
+    bag, results = str(tmp_path / 'images.bag'), str(tmp_path / 'latency.json')
+    write_bag(scenario_images(scenario, with_boxes=True), bag, 'none')
+    printed = subprocess.check_output(
+        [sys.executable, '-m', 'ros_3d_bb_lab.evaluation', 'latency', '--bag', bag, '--cases', 'free', '--seconds', '5',
+         '--rate', '10', '--separate', '--limits', '--json', results], universal_newlines=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # background jobs of a script ignore it
+        env=dict(os.environ, ROS_HOSTNAME='localhost', ROS_LOG_DIR=str(tmp_path)))
     with open(results) as stream:
         found = json.load(stream)
     case, = found['cases']
     assert found['machine'] and case['name'] in printed
-    assert (case['name'], case['detector'], case['load']) == ('free', 'free', 'none')
     assert case['output_hz'] > 0 and 0 < case['p50_ms'] <= case['p95_ms'] <= case['p99_ms']
     assert NODES <= set(case['cpu_percent']) & set(case['rss_mb']) & set(case['trend']['rss_mb_per_minute'])
     assert set(case['nodes']) == {'bbox3d_node', 'tracker_node'}
     assert case['pipeline']['cpu_percent'] == pytest.approx(sum(node['cpu_percent'] for node in case['nodes'].values()))
-    for node, found in case['nodes'].items():
-        assert found['cpu_percent'] == case['cpu_percent'][node] and found['limit_percent'] > 0
-        assert found['times_limit'] == pytest.approx(found['cpu_percent'] / found['limit_percent'])
     assert processes_naming(str(tmp_path)) == 0
-
-
-def test_the_topics_of_a_limit_are_those_of_the_node():
-    published = [['/tracks', ['/tracker']], ['/rosout', ['/tracker']], ['/diagnostics', ['/tracker', '/other']],
-                 ['/tracker/parameter_updates', ['/tracker']], ['/boxes', ['/other']]]
-    subscribed = [['/boxes', ['/tracker']], ['/tf', ['/tracker', '/other']], ['/clock', ['/tracker']],
-                  ['/tracks', ['/other', '/rviz']]]
-    assert topics_of('/tracker', (published, subscribed, [])) == ({'/boxes': 0, '/tf': 1}, {'/tracks': 2})

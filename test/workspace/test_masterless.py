@@ -1,6 +1,5 @@
 """Nodes and process_bag publish the same messages for the same bag, whose images may be compressed."""
 import pytest
-import rosbag
 from sensor_msgs.msg import CompressedImage
 
 from ros_3d_bb.bags.bag_pipeline import process_bag
@@ -13,6 +12,7 @@ from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.pipeline.people_pipeline import Settings
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
+from support.bags import messages_in
 from support.compressed import compressed_fields, rewritten
 from support.masterless import published
 
@@ -40,8 +40,7 @@ def bags(request, tmp_path_factory):
     (PeopleNode, 0, {'detector': 'depth'}, ['yolo_bounding_box', 'ros_3d_bb/bb_3d', 'ros_3d_bb/tracks'])])
 def test_process_bag_writes_the_messages_that_the_nodes_publish(bags, node_class, input_bag, params, topics):
     found = published(node_class, bags[input_bag], params, topics)
-    with rosbag.Bag(bags[1]) as bag:
-        for topic in topics:
-            expected = [message for _topic, message, _time in bag.read_messages('/' + topic)]
-            assert len(expected) == 15
-            assert [str(message) for message in found[topic]] == [str(message) for message in expected]
+    for topic in topics:
+        expected = messages_in(bags[1], '/' + topic)['/' + topic]
+        assert len(expected) == 15
+        assert [str(message) for message in found[topic]] == [str(message) for message in expected]

@@ -1,19 +1,16 @@
 """The benchmark of navigation: what each mode starts, and one trial under roslaunch."""
-import argparse
 import json
-import os
 import subprocess
 import sys
 
 import pytest
 
-from ros_3d_bb_lab.evaluation.navigation.benchmark import MODES, run_trial
+from ros_3d_bb_lab.evaluation.navigation.benchmark import MODES
 from support.launching import loaded
 from support.processes import processes_naming
 from support.real_planners import planner_environment
 
 ARGUMENTS = ['scenario:=/some/scene.yaml', 'record:=/some/record.json']
-OPTIONS = argparse.Namespace(planner='dwa', detector='exact', rate=10.0)
 SEPARATE = {'bbox3d_node', 'tracker_node'}
 PIPELINE = {'ours': SEPARATE, 'limited': SEPARATE, 'thesis': {'people_node'}}
 
@@ -39,29 +36,10 @@ def test_modes_differ_in_what_move_base_knows_of_people(mode):
     assert parameters['/simulator_node/drive'] and parameters['/simulator_node/supervised']
 
 
-@pytest.mark.parametrize('detector, node', [('depth', 'depth_detector_node'), ('yolov5', 'yolov5_node')])
-def test_a_detector_replaces_the_true_boxes(detector, node):
-    parameters, nodes = loaded('navigation_benchmark.launch', 'detector:=' + detector, 'weights:=/some/file.onnx',
-                               *ARGUMENTS)
-    assert not parameters['/simulator_node/boxes'] and nodes[node].type == node
-
-
-def test_a_trial_runs_with_teb():
-    parameters, _nodes = loaded('navigation_benchmark.launch', 'local_planner:=teb', *ARGUMENTS)
+def test_a_detector_replaces_the_true_boxes_and_a_trial_runs_with_teb():
+    parameters, nodes = loaded('navigation_benchmark.launch', 'detector:=depth', 'local_planner:=teb', *ARGUMENTS)
+    assert not parameters['/simulator_node/boxes'] and 'depth_detector_node' in nodes
     assert parameters['/move_base/base_local_planner'] == 'teb_local_planner/TebLocalPlannerROS'
-
-
-def test_a_recorded_trial_is_not_repeated(tmp_path, monkeypatch):
-    started = []
-    monkeypatch.setattr('ros_3d_bb_lab.evaluation.navigation.benchmark.launch',
-                        lambda *arguments: started.append(arguments))
-    (tmp_path / 'standing-ours-3.json').write_text('{"collisions": 0}')
-    assert run_trial(('standing', 'ours', 3, str(tmp_path), OPTIONS)) == {
-        'scene': 'standing', 'mode': 'ours', 'seed': 3, 'collisions': 0}
-    assert not started
-    with pytest.raises(RuntimeError, match='standing, ours, seed 4: no result'):
-        run_trial(('standing', 'ours', 4, str(tmp_path), OPTIONS))
-    assert len(started) == 1
 
 
 @pytest.mark.long
@@ -80,12 +58,3 @@ def test_a_robot_that_knows_nothing_of_people_drives_into_one(tmp_path):
     assert row['stops'] >= 1
     assert row['time_to_goal_s'] is None and -0.03 < row['min_distance_m'] < 0.03
     assert processes_naming(str(logs)) == 0
-
-
-def test_without_move_base_the_benchmark_says_so(tmp_path):
-    paths = [path for path in os.environ.get('ROS_PACKAGE_PATH', '').split(os.pathsep) if 'planners-' not in path]
-    process = subprocess.run([sys.executable, '-m', 'ros_3d_bb_lab.evaluation', 'navigation', '--runs', '1'],
-                             env=dict(os.environ, ROS_PACKAGE_PATH=os.pathsep.join(paths)), stdout=subprocess.PIPE,
-                             stderr=subprocess.STDOUT, universal_newlines=True)
-    assert process.returncode == 1 and 'move_base is not installed' in process.stdout
-    assert 'Traceback' not in process.stdout

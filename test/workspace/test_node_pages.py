@@ -84,10 +84,3 @@ def test_a_node_connects_to_the_topics_and_services_of_its_docstring(name):
         if hasattr(node, 'pause_or_resume'):
             node.pause_or_resume()
         assert {call[0][0]: call[0][1]._type for call in proxy.call_args_list} == documented(name, 'Calls')
-
-
-def test_a_parameter_without_description_is_an_error():
-    node = NODES['tracker_node']
-    with mock.patch.object(node_pages, 'text_in_launch_file', lambda _node, _parameter: None):
-        with pytest.raises(ValueError, match='target_frame'):
-            node_pages.parameters_of(node)

@@ -1,7 +1,6 @@
 """Raw depth, registered by the pipeline: the same positions as depth that is aligned to colour."""
 import numpy as np
 import pytest
-import rosbag
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
@@ -21,12 +20,14 @@ from ros_3d_bb.pipeline.people_pipeline import Settings
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
+from support.bags import changed_bag, messages_in
 from support.launching import loaded
 from support.masterless import published
 
 IMAGES, COLOR_FRAME, DEPTH_FRAME = 5, 'camera_color_optical_frame', 'camera_depth_optical_frame'
 DEPTH_CAMERA = Camera(848, 480, 421.0, 421.0, 424.2, 238.9)
 MOUNT_M = (0.17, 0.0, 0.20)
+BASELINE_M = 0.05  # between the cameras
 PEOPLE = [{'start': [2.2, 0.5], 'facing': 3.1}, {'start': [3.2, -0.9], 'moves': [{'to': [3.2, -0.3]}]},
           {'start': [5.0, -0.2], 'facing': 1.0}]
 RAW_TOPIC, RAW_INFO_TOPIC = DEPTH_TOPICS['raw']
@@ -40,10 +41,10 @@ def simulator(beside_m, camera):
     return Simulator(scenario_from(content), camera)
 
 
-def images(baseline_m, color, depth):
+def images(color, depth):
     """The messages of a driver that aligns depth and publishes raw depth beside it, with true 2D boxes."""
     color_from_depth = np.linalg.inv(color.poses_at(0).map_from_camera).dot(depth.poses_at(0).map_from_camera)
-    assert np.allclose(color_from_depth[:3, 3], (-baseline_m, 0, 0))
+    assert np.allclose(color_from_depth[:3, 3], (-BASELINE_M, 0, 0))
     for number in range(IMAGES):
         frame, beside = color.frame(number), depth.frame(number)
         stamp_ns = START_NS + number * NS // IMAGES
@@ -61,18 +62,17 @@ def images(baseline_m, color, depth):
         yield stamp_ns, messages
 
 
-@pytest.fixture(scope='module', params=[0.015, 0.05])
-def bag(request, tmp_path_factory):
-    """A bag with aligned and raw depth of one scene. The parameter is the distance between the cameras, metres."""
+@pytest.fixture(scope='module')
+def bag(tmp_path_factory):
+    """A bag with aligned and raw depth of one scene."""
     path = str(tmp_path_factory.mktemp('raw') / 'in.bag')
-    write_bag(images(request.param, simulator(0.0, D435I_COLOR), simulator(request.param, DEPTH_CAMERA)), path)
+    write_bag(images(simulator(0.0, D435I_COLOR), simulator(BASELINE_M, DEPTH_CAMERA)), path)
     return path
 
 
 def boxes_in(path):
     """The messages on ros_3d_bb/bb_3d, and the centres of their boxes, (n, 3)."""
-    with rosbag.Bag(str(path)) as found:
-        messages = [message for _topic, message, _time in found.read_messages(['/ros_3d_bb/bb_3d'])]
+    messages = messages_in(path, '/ros_3d_bb/bb_3d')['/ros_3d_bb/bb_3d']
     centers = [box.center.position for message in messages for box in message.boxes]
     return messages, np.array([(center.x, center.y, center.z) for center in centers])
 
@@ -106,25 +106,15 @@ def test_the_nodes_publish_the_same(bag, tmp_path):
     for node_class, params, topic in ((DepthDetectorNode, {}, BOXES_TOPIC), (Bbox3dNode, {}, BOXES3D_TOPIC),
                                       (TrackerNode, {'tf_timeout': 0.0}, TRACKS_TOPIC)):
         found = published(node_class, str(tmp_path / 'raw'), dict(params, depth='raw'), [topic])
-        with rosbag.Bag(str(tmp_path / 'raw')) as written:
-            expected = [message for _topic, message, _time in written.read_messages('/' + topic)]
+        expected = messages_in(tmp_path / 'raw', '/' + topic)['/' + topic]
         assert len(expected) == IMAGES and [str(message) for message in found[topic]] == list(map(str, expected))
-
-
-def without(path, target, unwanted):
-    """Copy a bag without the messages on a topic."""
-    with rosbag.Bag(path) as old, rosbag.Bag(str(target), 'w') as new:
-        for topic, message, stamp in old.read_messages():
-            if topic != '/' + unwanted:
-                new.write(topic, message, stamp)
-    return str(target)
 
 
 @pytest.mark.parametrize('unwanted,named', [(STATIC_TOPIC, (COLOR_FRAME, DEPTH_FRAME)),
                                             (RAW_INFO_TOPIC, ('/' + RAW_INFO_TOPIC,))])
 def test_what_registration_needs_is_named_if_it_is_missing(bag, tmp_path, unwanted, named):
-    source = without(bag, tmp_path / 'in.bag', unwanted)
-    events = process_bag(source, str(tmp_path / 'out.bag'), settings())
+    changed_bag(bag, tmp_path / 'in.bag', lambda topic, *rest: None if topic == '/' + unwanted else (topic,) + rest)
+    events = process_bag(str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'), settings())
     assert events.counts['2D boxes rejected'] == IMAGES
     assert all(name in events.sentences['2D boxes rejected'] for name in named)
 

@@ -3,7 +3,6 @@ import json
 import os
 import re
 import shutil
-import subprocess
 
 import pytest
 import rosbag
@@ -29,12 +28,12 @@ TRACKS_TO_CSV = claimed('rosrun ros_3d_bb scene_report result.bag --csv')
 PROCESS_BAGS = claimed('mkdir -p results')
 SESSION_TO_BAG = claimed('rosrun ros_3d_bb session_to_bag')
 SCENARIO_TO_BAG = claimed('rosrun ros_3d_bb scenario_to_bag')
+CAMPAIGN = claimed('annotator/annotator --export')
 STAMPED = claimed('message = Int32MultiArray', 'python')
 # Options that shorten a benchmark.
 BENCHMARKS = [(claimed('./run bench accuracy --boxes'), ''), (claimed('./run bench scenes'), ''),
               (claimed('./run bench speed\n'), ' --images 1')]
 DETECTORS = claimed('./run bench detector')
-YAML = [claimed('max_obstacles:', 'yaml')]
 MODEL_SETTINGS = [claimed('# %s.yaml' % name, 'yaml') for name in (
     'yolo11n', 'people_yolov7', 'yolox_legacy', 'nanodet', 'picodet_s_416', 'with_nms')]
 
@@ -123,6 +122,16 @@ def test_sessions_and_scenes_become_bags(reader, clone, data):
         assert 'some.bag: ' in reader.types(block, at)
 
 
+def test_a_session_is_exported_analysed_and_validated(reader, session_folder):
+    folder = reader.home / 'campaign'
+    folder.mkdir()
+    for name in os.listdir(session_folder):
+        os.symlink(os.path.join(session_folder, name), str(folder / name))
+    os.symlink(str(folder), str(reader.clone / 'SESSION'))
+    assert ', 0 problems' in reader.types(CAMPAIGN, reader.clone)
+    assert (reader.clone / 'table.csv').exists() and (folder / 'analysis' / 'report.html').exists()
+
+
 @pytest.mark.parametrize('block,shortened', BENCHMARKS)
 def test_benchmarks_print_a_table(reader, clone, data, block, shortened):
     printed = reader.types(block, clone, appended=shortened, ROS_3D_BB_DATA=data)
@@ -151,15 +160,3 @@ def test_stamp_and_frame_in_the_layout_of_2d_boxes():
 def test_settings_of_models_are_valid(block):
     settings = settings_from(load_yaml(block.text))
     assert settings != ModelSettings() and settings.head in block.text
-
-
-@pytest.mark.parametrize('block', YAML, ids=lambda block: block.text.split(':')[0])
-def test_parameters_of_planners_can_be_loaded(reader, tmp_path, block):
-    """roslaunch sets the parameters of the block: it has no duplicate keys or tabs."""
-    (tmp_path / 'planner.yaml').write_text(block.text)
-    (tmp_path / 'planner.launch').write_text(
-        '<launch><rosparam command="load" file="%s"/></launch>' % (tmp_path / 'planner.yaml'))
-    printed = subprocess.check_output(['roslaunch', '--dump-params', str(tmp_path / 'planner.launch')],
-                                      env=reader.environment())
-    loaded = yaml.safe_load(printed)
-    assert set(name.split('/')[1] for name in loaded) == set(yaml.safe_load(block.text))

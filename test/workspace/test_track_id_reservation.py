@@ -37,7 +37,6 @@ def parameters(monkeypatch):
 
 
 def test_a_restarted_tracker_continues_after_all_ids_assigned_before(parameters):
-    """Many IDs, in each of five lives."""
     largest = 0
     for life in range(5):
         reservation = TrackIdReservation(EventCounter())

@@ -1,0 +1,139 @@
+"""people_removal_node, planner_bridge_node and speed_limit_node with generated tracks, scans and commands.
+
+They need a master because of ROS time, tf2 and deadlines. Stamps are those of the clock, as from a camera: a tenth of a
+second old. Their outputs are tested without a master in test/workspace, the speeds in test/unit/test_safe_speed.py.
+"""
+import signal
+import subprocess
+import time
+
+import numpy as np
+import pytest
+import rospy
+from geometry_msgs.msg import TransformStamped, Twist, Vector3
+from sensor_msgs.msg import LaserScan, PointCloud2
+from std_msgs.msg import Float32
+from tf2_msgs.msg import TFMessage
+
+from ros_3d_bb.conversions.perception_msgs import time_from
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.msg import TrackedObjectArray
+from support.planners import person
+from support.ros import Recorder, header_at, publisher, wait_until
+
+LATENCY_NS, TIMEOUT_S = NS // 10, 0.5
+COMMAND = Twist(linear=Vector3(x=1.2), angular=Vector3(z=0.6))
+BEAMS = 181
+OPEN_M, NEAR_M = np.full(BEAMS, np.inf), np.full(BEAMS, 3.0)
+CORNER_M = np.where(np.arange(BEAMS) > 110, 1.5, np.inf)  # from 20 degrees on the left
+BESIDE = 5.0, -6.0
+
+
+class Rig(object):
+    """A tracker, and a robot with a laser at (5, 1) of the map that looks along its x."""
+
+    def __init__(self):
+        self.tracks, self._tf = publisher('ros_3d_bb/tracks', TrackedObjectArray), publisher('/tf', TFMessage)
+        self._commands, self._scans = publisher('cmd_vel_in', Twist), publisher('front/scan', LaserScan)
+        self.limits = Recorder('speed_limit_node/speed_limit', Float32)
+        self.velocities = Recorder('cmd_vel', Twist)
+        self.static_scans = Recorder('people_removal_node/scan_static', LaserScan)
+
+    def send(self, *positions, ranges_m=OPEN_M):
+        """Standing people at positions (x, y) of the map, and a scan. Returns the stamp."""
+        stamp_ns = rospy.get_rostime().to_nsec() - LATENCY_NS
+        robot = TransformStamped(header=header_at(stamp_ns, 'map'), child_frame_id='base_link')
+        robot.transform.translation.x, robot.transform.translation.y, robot.transform.rotation.w = 5.0, 1.0, 1.0
+        self._tf.publish(TFMessage([robot]))
+        self.tracks.publish(TrackedObjectArray(header=header_at(stamp_ns, 'map'), objects=[
+            person(number, x, y, moving=False, speed=0.0) for number, (x, y) in enumerate(positions, 1)]))
+        if ranges_m is not None:
+            self._scans.publish(LaserScan(header=header_at(stamp_ns, 'base_link'), angle_min=-np.pi / 2,
+                                          angle_increment=np.pi / 180, range_max=10.0, ranges=ranges_m.tolist()))
+        return time_from(stamp_ns)
+
+    def commanded(self, *positions, ranges_m=OPEN_M):
+        """The last of a second of commands, among these people: linear, angular, and the last limit."""
+        self.velocities.emptied()
+        self.limits.emptied()
+        for _command in range(10):
+            self.send(*positions, ranges_m=ranges_m)
+            self._commands.publish(COMMAND)
+            time.sleep(0.1)
+        velocities = self.velocities.wait_for(10)
+        return velocities[-1].linear.x, velocities[-1].angular.z, self.limits.messages[-1].data
+
+    def answer(self):
+        """The command that follows from one without new tracks."""
+        self.velocities.emptied()
+        self._commands.publish(COMMAND)
+        message, = self.velocities.wait_for(1)
+        return message.linear.x, message.angular.z
+
+
+@pytest.fixture(scope='module')
+def rig():
+    rospy.init_node('test_planning_nodes')
+    return Rig()
+
+
+def test_without_tracks_the_robot_stands(rig):
+    assert rig.answer() == (0.0, 0.0)
+    assert rig.limits.emptied().wait_for(1)[0].data == 0.0
+
+
+def test_commands_are_limited_before_a_person_and_keep_their_path(rig):
+    assert rig.commanded(BESIDE) == pytest.approx((1.2, 0.6, 2.0))
+    linear, angular, limit = rig.commanded((6.6, 1.4))
+    assert 0.4 < linear < 1.1 and linear == pytest.approx(limit, abs=0.05) and angular == pytest.approx(linear / 2)
+
+
+def test_commands_are_limited_before_a_blind_corner_and_without_scans(rig):
+    assert rig.commanded(BESIDE, ranges_m=CORNER_M)[0] == pytest.approx(0.3)
+    assert rig.commanded(BESIDE, ranges_m=np.full(BEAMS, 1.5))[0] == pytest.approx(1.2)
+    assert rig.commanded(BESIDE, ranges_m=None)[0] == pytest.approx(0.3)
+
+
+def test_the_limit_is_zero_half_a_second_after_the_last_image(rig):
+    rig.commanded(BESIDE)
+    rig.send(BESIDE)
+    sent_s = time.monotonic()
+    wait_until(lambda: rig.limits.messages[-1].data == 0.0, 'the limit 0')
+    assert TIMEOUT_S - LATENCY_NS / NS - 0.15 < time.monotonic() - sent_s < TIMEOUT_S + 0.3
+    assert rig.answer() == (0.0, 0.0)
+
+
+def test_people_are_removed_from_the_scan_and_nothing_else(rig):
+    """A person of 0.6 m at 3 m, with 0.2 m around: half of the angle is asin(0.5 / 3), about 10 beams."""
+    def is_removed():  # scans, tracks and tf are not ordered
+        stamp = rig.send((8.0, 1.0), ranges_m=NEAR_M)
+        wait_until(lambda: rig.static_scans.messages[-1].header.stamp == stamp, 'the scan')
+        return np.isnan(rig.static_scans.messages[-1].ranges).any()
+    wait_until(is_removed, 'a scan without the person')
+    result = rig.static_scans.messages[-1]
+    removed = np.flatnonzero(np.isnan(result.ranges))
+    assert removed.tolist() == list(range(removed[0], removed[-1] + 1)) and 17 <= len(removed) <= 21
+    assert (removed[0] + removed[-1]) / 2 == (BEAMS - 1) / 2
+    assert np.delete(result.ranges, removed).tolist() == [3.0] * (BEAMS - len(removed))
+    assert result.header.frame_id == 'base_link'
+
+
+def test_points_for_planners_carry_the_stamp_of_the_image(rig):
+    with Recorder('planner_bridge_node/points', PointCloud2) as recorder:
+        stamp = rig.send((1.0, 2.0))
+        message, = recorder.wait_for(1)
+    assert message.header.frame_id == 'base_link' and message.header.stamp == stamp and message.width > 0
+
+
+def test_a_bridge_that_ends_empties_its_outputs(rig):
+    process = subprocess.Popen(['rosrun', 'ros_3d_bb', 'planner_bridge_node', '__name:=second_bridge'])
+    try:
+        with Recorder('second_bridge/points', PointCloud2) as recorder:
+            wait_until(lambda: rig.tracks.get_num_connections() == 4, 'the second bridge')
+            rig.send((1.0, 2.0))
+            wait_until(lambda: recorder.messages and recorder.messages[-1].width, 'points')
+            process.send_signal(signal.SIGINT)
+            wait_until(lambda: not recorder.messages[-1].width, 'an empty cloud')
+    finally:
+        process.kill()
+        process.wait()

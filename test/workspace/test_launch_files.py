@@ -1,0 +1,207 @@
+"""Parameters, nodes and topics that launch files set for their arguments, with stand-ins for realsense2_camera.
+
+test_package.py loads each launch file, test_camera_mount.py those with the pose of a camera. test/nodes/navigation.test
+runs navigation.launch with the planners.
+"""
+import os
+import re
+import shlex
+
+import numpy as np
+import pytest
+import yaml
+
+from support.launching import ROOT, dumped, given_to_stand_ins, loaded
+
+JACKAL_CAMERA = os.path.join(ROOT, 'urdf', 'jackal_d435i.urdf.xacro')
+MEASURE = 'measure.launch session:="/a session" weights:=/some.pt '
+OWN_DRIVER = 'realsense.launch driver:=pyrealsense2 '
+LOCAL, GLOBAL = '/move_base/local_costmap/', '/move_base/global_costmap/'
+OF_USER = ('navigation.launch frame_world:=my_map odom_frame:=my_odom robot_frame:=my_base scan_topic:=my_scan '
+           'odom_topic:=my_odometry map_topic:=my_map_topic cmd_vel_topic:=my_cmd_vel')
+MOUNT = '0.17 0 0.20 0 0 0 base_link camera_link'
+# A command, and what it sets: parameters, `nodes`, `TYPE:TOPIC` for a remapping and `COSTMAP layers`.
+CASES = [
+    (MEASURE, {'nodes': ['people_node', 'viewer_node'], '/viewer_node/session': '/a session',
+               '/viewer_node/window': True, '/tracker_node/target_frame': 'map',
+               'viewer_node:detector/enable': 'yolov5_node/enable'}),
+    (MEASURE + 'detector:=depth', {'viewer_node:detector/enable': 'depth_detector_node/enable'}),
+    (MEASURE + 'camera:=true driver:=pyrealsense2', {'nodes': ['people_node', 'realsense_node', 'viewer_node']}),
+    (MEASURE + 'camera_image:=a/color bb_topic:=a/boxes', {
+        'viewer_node:camera/color/image_raw': 'a/color', 'people_node:camera/color/image_raw': 'a/color',
+        'viewer_node:yolo_bounding_box': 'a/boxes', 'people_node:yolo_bounding_box': 'a/boxes'}),
+    (OWN_DRIVER + 'width:=848 fps:=15 exposure:=0.008', {
+        'nodes': ['realsense_node'], '/use_sim_time': None, '/realsense_node/frame_prefix': 'camera',
+        '/realsense_node/width': 848, '/realsense_node/height': 480, '/realsense_node/fps': 15,
+        '/realsense_node/exposure': 0.008, '/realsense_node/publish_clock': False}),
+    (OWN_DRIVER + 'camera:=front', {
+        'front_realsense_node:camera/color/image_raw': 'front/color/image_raw',
+        'front_realsense_node:camera/color/camera_info': 'front/color/camera_info',
+        'front_realsense_node:camera/aligned_depth_to_color/image_raw': 'front/aligned_depth_to_color/image_raw',
+        'front_realsense_node:camera/aligned_depth_to_color/camera_info': 'front/aligned_depth_to_color/camera_info'}),
+    ('realsense.launch file:=/some/where.bag repeat:=true', {
+        'nodes': ['realsense_node'], '/use_sim_time': True, '/realsense_node/file': '/some/where.bag',
+        '/realsense_node/repeat': True, '/realsense_node/publish_clock': True}),
+    ('navigation.launch', {
+        'nodes': ['move_base', 'planner_bridge_node'], 'move_base:cmd_vel': 'cmd_vel',
+        '/move_base/base_local_planner': 'dwa_local_planner/DWAPlannerROS', '/planner_bridge_node/outputs': 'costmap',
+        'local layers': ['obstacle_layer', 'people_layer', 'prediction_layer'],
+        'global layers': ['static_layer', 'obstacle_layer', 'people_layer', 'inflation_layer'],
+        LOCAL + 'prediction_layer/map_topic': 'planner_bridge_node/costs', LOCAL + 'rolling_window': True,
+        GLOBAL + 'rolling_window': None, LOCAL + 'global_frame': 'odom', GLOBAL + 'global_frame': 'map',
+        LOCAL + 'robot_base_frame': 'base_link', LOCAL + 'obstacle_layer/scan/topic': 'front/scan',
+        '/move_base/DWAPlannerROS/odom_topic': 'odometry/filtered'}),  # the names of a Jackal
+    ('jackal.launch driver:=none weights:=/some.pt', {
+        '/tracker_node/target_frame': 'map', '/bbox3d_node/floor_frame': 'base_link'}),
+    (OF_USER, {
+        LOCAL + 'global_frame': 'my_odom', GLOBAL + 'global_frame': 'my_map', LOCAL + 'robot_base_frame': 'my_base',
+        GLOBAL + 'robot_base_frame': 'my_base', LOCAL + 'obstacle_layer/scan/topic': 'my_scan',
+        GLOBAL + 'obstacle_layer/scan/topic': 'my_scan', GLOBAL + 'static_layer/map_topic': 'my_map_topic',
+        '/move_base/DWAPlannerROS/odom_topic': 'my_odometry', '/move_base/TebLocalPlannerROS/odom_topic': 'my_odometry',
+        '/planner_bridge_node/robot_frame': 'my_base', '/planner_bridge_node/planner_frame': 'my_odom',
+        'move_base:cmd_vel': 'my_cmd_vel'}),
+    ('navigation.launch local_planner:=teb', {  # people are its obstacles; the costmap has only the ring
+        '/move_base/base_local_planner': 'teb_local_planner/TebLocalPlannerROS',
+        '/planner_bridge_node/outputs': 'costmap, teb', LOCAL + 'people_layer/observation_sources': 'clearing',
+        LOCAL + 'people_layer/clearing/expected_update_rate': 0.5, LOCAL + 'prediction_layer/enabled': False,
+        'move_base:~TebLocalPlannerROS/obstacles': 'planner_bridge_node/obstacles'}),
+    ('navigation.launch global_costmap:=rolling', {
+        'global layers': ['obstacle_layer', 'people_layer', 'inflation_layer']}),
+    ('navigation.launch global_costmap:=social', {
+        '/planner_bridge_node/outputs': 'costmap, people',
+        'global layers': ['static_layer', 'obstacle_layer', 'people_layer', 'proxemic_layer', 'inflation_layer']}),
+    ('pipeline.launch detector:=depth rviz:=true camera_image:=rgb/image/compressed', {
+        'rviz:camera/color/image_raw': 'rgb/image'}),
+    ('pipeline.launch detector:=depth rviz:=true cameras:=front,rear', {
+        'rviz:camera/color/image_raw': 'front/color/image_raw'}),
+    ('pipeline.launch weights:=/some.pt floor_frame:=none', {
+        '/bbox3d_node/floor_frame': '', '/yolov5_node/floor_frame': ''}),
+    ('playback.launch bag:=/b.bag detector:=depth camera_pose:=floor image_rotation:=90', {
+        '/camera_pose_node/frame_world': 'map', '/camera_pose_node/image_rotation': '90',
+        '/bbox3d_node/floor_frame': 'map', '/depth_detector_node/floor_frame': 'map',
+        '/depth_detector_node/floor_height': 0, '/tracker_node/target_frame': 'map'}),
+    ('simulation.launch rviz:=false error_model:=none', {
+        '/bbox3d_node/floor_frame': 'base_link', '/bbox3d_node/error_model': None, '/tracker_node/error_model': None})]
+
+
+@pytest.mark.parametrize('command, expected', CASES, ids=[command for command, _expected in CASES])
+def test_arguments_set_parameters_nodes_and_topics(command, expected):
+    found, nodes = loaded(*shlex.split(command))
+    found['nodes'] = sorted(nodes)
+    for node in nodes.values():
+        found.update(('%s:%s' % (node.type, topic), target) for topic, target in node.remap_args)
+    for costmap in ('local', 'global'):
+        layers = found.get('/move_base/%s_costmap/plugins' % costmap, [])
+        found[costmap + ' layers'] = [layer['name'] for layer in layers]
+    assert {key: found.get(key) for key in expected} == expected
+
+
+def test_a_measurement_is_recorded_with_the_topics_of_the_camera():
+    _parameters, nodes = loaded(*shlex.split(MEASURE + 'camera_depth:=a/depth record:="/some where/a.bag"'))
+    assert '/a/depth' in nodes['recorder'].args.split()
+    assert "--output-name '/some where/a.bag'" in nodes['recorder'].args and nodes['viewer_node'].required
+
+
+def test_commands_of_the_container_start_camera_and_pipeline():
+    with open(os.path.join(ROOT, 'docker', 'compose.yaml')) as stream:
+        services = yaml.safe_load(stream)['services']
+    nodes = {}
+    for name, service in services.items():
+        command = re.sub(r'\$\{\w+:-([^}]*)\}', r'\1', service['command'])  # variables have their defaults
+        program, wait, package, *arguments = shlex.split(command)
+        assert (program, wait, package) == ('roslaunch', '--wait', 'ros_3d_bb')
+        nodes[name] = set(loaded(*arguments)[1])
+    assert 'realsense_node' in nodes['camera'] and {'people_node', 'planner_bridge_node'} <= nodes['pipeline']
+
+
+def test_files_of_the_user_take_precedence(tmp_path):
+    for name, content in (('mine', 'DWAPlannerROS: {max_vel_x: 0.4}'), ('bridge', 'timeout: 3.0')):
+        (tmp_path / name).write_text(content)
+    parameters, _nodes = loaded('navigation.launch', 'params:=%s' % (tmp_path / 'mine'),
+                                'planner_bridge_params:=%s' % (tmp_path / 'bridge'))
+    assert parameters['/planner_bridge_node/timeout'] == 3.0
+    assert parameters['/move_base/DWAPlannerROS/max_vel_x'] == 0.4
+    assert parameters['/move_base/DWAPlannerROS/max_vel_theta'] == 1.5
+
+
+@pytest.mark.parametrize('local_planner, group', [('dwa', 'DWAPlannerROS'), ('teb', 'TebLocalPlannerROS')])
+def test_commands_are_within_the_limits_of_a_jackal(local_planner, group):
+    """Those of its controller and twist_mux, github.com/jackal/jackal (commit c6ab6ca)."""
+    parameters, _nodes = loaded('navigation.launch', 'local_planner:=' + local_planner)
+    for name, limit in (('max_vel_x', 2.0), ('acc_lim_x', 20.0), ('max_vel_theta', 4.0), ('acc_lim_theta', 25.0)):
+        assert parameters['/move_base/%s/%s' % (group, name)] <= limit
+    assert 1 / parameters['/move_base/controller_frequency'] < 0.25  # it stops the robot when commands stay away
+    half_m = np.min(np.abs(parameters[LOCAL + 'footprint']), axis=0) + parameters[LOCAL + 'footprint_padding']
+    assert (half_m >= (0.229, 0.208)).all()  # the wheels
+
+
+def test_the_footprint_of_the_local_planner_and_the_costmaps_is_one():
+    parameters, _nodes = loaded('navigation.launch', 'local_planner:=teb')
+    assert (parameters[LOCAL + 'footprint'] == parameters[GLOBAL + 'footprint']
+            == parameters['/move_base/TebLocalPlannerROS/footprint_model/vertices'])
+
+
+def test_the_driver_aligns_depth_to_colour_of_the_same_size_and_rate(camera_package):
+    """The stand-in rejects arguments that are not those of the release. The exposure is in units of the sensor."""
+    parameters = dumped('realsense.launch', camera_package)
+    assert given_to_stand_ins(parameters) == {
+        'align_depth': 'true', 'camera': 'camera', 'initial_reset': 'false', 'color_width': '640',
+        'color_height': '480', 'color_fps': '30', 'depth_width': '640', 'depth_height': '480', 'depth_fps': '30',
+        'respawn': 'false'}
+    assert parameters['/camera/rgb_camera/enable_auto_exposure'] is True
+    assert parameters['/camera/rgb_camera/auto_exposure_priority'] is False
+    parameters = dumped('realsense.launch', camera_package, 'camera:=front', 'serial_no:=0123', 'fps:=15',
+                        'width:=848', 'filters:=disparity,spatial', 'initial_reset:=true', 'exposure:=0.008')
+    given = given_to_stand_ins(parameters)
+    assert given['camera'] == 'front' and given['filters'] == 'disparity,spatial' and given['initial_reset'] == 'true'
+    assert (given['color_width'], given['depth_width'], given['color_fps'], given['depth_fps']) == (
+        '848', '848', '15', '15')
+    assert given['serial_no'].lstrip('0') == '123'
+    assert parameters['/front/rgb_camera/enable_auto_exposure'] is False
+    assert parameters['/front/rgb_camera/exposure'] == 80
+
+
+def test_a_measured_camera_aligns_depth_and_its_frame_is_the_target(camera_package):
+    parameters = dumped('measure.launch', camera_package, 'camera:=true', 'detector:=depth', 'session:=/a')
+    assert given_to_stand_ins(parameters)['align_depth'] == 'true'
+    assert parameters['/tracker_node/target_frame'] == 'camera_link'
+    assert parameters['/depth_detector_node/floor_frame'] == ''
+
+
+def test_one_command_starts_camera_and_pipeline_of_a_jackal(camera_package):
+    parameters = dumped('jackal.launch', camera_package, 'weights:=/some/yolov5n.pt', 'fps:=15', 'planner:=costmap',
+                        'frame_world:=odom', 'error_model:=/some/model.yaml')
+    given = given_to_stand_ins(parameters)
+    assert (given['align_depth'], given['color_fps'], given['respawn']) == ('true', '15', 'true')
+    assert parameters['/yolov5_node/weights'] == '/some/yolov5n.pt'
+    assert parameters['/tracker_node/target_frame'] == 'odom'
+    assert parameters['/planner_bridge_node/outputs'] == 'costmap'
+    assert parameters['/bbox3d_node/error_model'] == parameters['/tracker_node/error_model'] == '/some/model.yaml'
+
+
+@pytest.mark.parametrize('extras, arguments, expected', [
+    ('/some/arm.urdf.xacro', [], MOUNT),
+    ('', ['mount:=0.1 0 0.4 0 0.5 0'], '0.1 0 0.4 0 0.5 0 base_link camera_link'),
+    (JACKAL_CAMERA, [], None), ('', ['mount:=none'], None)])
+def test_camera_mount_is_published_unless_the_description_contains_it(monkeypatch, extras, arguments, expected):
+    monkeypatch.setenv('JACKAL_URDF_EXTRAS', extras)
+    _parameters, nodes = loaded('jackal.launch', 'driver:=pyrealsense2', *arguments)
+    assert (nodes['camera_mount'].args if 'camera_mount' in nodes else None) == expected
+
+
+@pytest.mark.parametrize('command, is_respawned', [
+    ('jackal.launch driver:=pyrealsense2 planner:=costmap', True),
+    ('jackal.launch driver:=pyrealsense2 planner:=costmap respawn:=false', False),
+    ('pipeline.launch planner:=costmap weights:=yolov5n.pt', False)])
+def test_nodes_are_respawned_on_the_robot_only(command, is_respawned):
+    """Elsewhere only with respawn:=true, because configuration errors would be logged repeatedly."""
+    _parameters, nodes = loaded(*command.split())
+    assert {node.respawn for node in nodes.values()} == {is_respawned}
+
+
+def test_computer_moves_the_pipeline_but_not_the_camera():
+    _parameters, nodes = loaded('jackal.launch', 'driver:=pyrealsense2', 'computer:=192.168.131.20',
+                                'planner:=costmap')
+    remote = set(name for name, node in nodes.items() if node.machine_name == 'people')
+    assert remote == {'people_node', 'planner_bridge_node'}
+    assert set(nodes) - remote == {'realsense_node', 'camera_mount'}
