@@ -1,11 +1,10 @@
 """The benchmark of predictions by kind of motion."""
 import json
-import sys
 
 import numpy as np
 import pytest
 
-from ros_3d_bb_lab.evaluation.tracking import motion_benchmark
+from ros_3d_bb_lab.evaluation import __main__ as command
 from ros_3d_bb_lab.evaluation.tracking.motion_benchmark import Clip, scores_of
 
 TIMES_S = np.arange(0, 6, 0.02)
@@ -42,18 +41,12 @@ def test_clips_that_are_too_short_have_no_scores():
     assert set(scores_of([Clip(TIMES_S[:60], WALK.points_m[:60])], 10).values()) == {None}
 
 
-def run_command(monkeypatch, *arguments):
-    monkeypatch.setattr(sys, 'argv', ['./run bench prediction'] + list(arguments))
-    monkeypatch.delenv('ROS_3D_BB_DATA', raising=False)
-    motion_benchmark.main()
-
-
-def test_the_command_writes_scores_by_kind(monkeypatch, tmp_path):
+def test_the_command_writes_scores_by_kind(tmp_path):
     (tmp_path / 'walking').mkdir()
     lines = ['%d,%g,%g,%g' % ((row, time_s) + tuple(point_m)) for row, (time_s, point_m)
              in enumerate(zip(*WALK))]
     (tmp_path / 'walking' / '1.csv').write_text('\n'.join([',timestamp,x,y'] + lines))
-    run_command(monkeypatch, '--data', str(tmp_path), '--json', str(tmp_path / 'scores.json'))
+    command.main(['prediction', '--data', str(tmp_path), '--json', str(tmp_path / 'scores.json')])
     scores = json.loads((tmp_path / 'scores.json').read_text())['walking']
     assert {'coverage_95_2s', 'ours_fde_2s_m', 'cv_fde_2s_m', 'area_95_2s_m2'} <= set(scores)
     assert set(scores['rates']) == {'30', '15', '10', '5', '3'}
@@ -63,16 +56,16 @@ def test_the_command_writes_scores_by_kind(monkeypatch, tmp_path):
 
 @pytest.mark.parametrize('text,message', [(None, 'no folder with .csv files'), ('t,x,y\n0,0,0', 'timestamp'),
                                           ('timestamp,x,y\n0,0,0', 'increasing timestamp'),
-                                          ('timestamp,x,y\n0,a,0', 'numbers in the columns')])
-def test_unusable_data_is_named(monkeypatch, tmp_path, text, message):
+                                          ('timestamp,x,y\n0,a,0', 'line 2: 0,a,0; a number')])
+def test_unusable_data_is_named(tmp_path, text, message):
     if text is not None:
         (tmp_path / 'walking').mkdir()
         (tmp_path / 'walking' / '1.csv').write_text(text)
-    with pytest.raises(ValueError, match=message):
-        run_command(monkeypatch, '--data', str(tmp_path))
+    with pytest.raises(SystemExit, match=message):
+        command.main(['prediction', '--data', str(tmp_path)])
 
 
-def test_the_command_needs_data(monkeypatch, capsys):
-    with pytest.raises(SystemExit):
-        run_command(monkeypatch)
-    assert '--data DIR or ROS_3D_BB_DATA expected' in capsys.readouterr().err
+def test_the_command_needs_data(monkeypatch):
+    monkeypatch.delenv('ROS_3D_BB_DATA', raising=False)
+    with pytest.raises(SystemExit, match='--data DIR or ROS_3D_BB_DATA expected'):
+        command.main(['prediction'])

@@ -50,17 +50,14 @@ def test_the_thesis_predicts_two_seconds_along_the_velocity(session):
     np.testing.assert_allclose(ahead_m[1], (3, -0.2 - 2 * (0.2 + 0.8 * 0.2), 1), atol=1e-6)
 
 
-def test_results_and_table_for_each_number_of_people(session):
-    result = dict(benchmark.speed(session, counts=(1, 5), images=3), detector=[])
+def test_results_for_each_number_of_people(session):
+    result = benchmark.speed(session, counts=(1, 5), images=3)
     assert result['objects'] == [1, 5] and result['machine'] == describe_machine()
     for name in ('ours', 'thesis'):
-        assert set(result[name]) == {stage + suffix for stage in ('estimation', 'tracking', 'both')
-                                     for suffix in ('_ms', '_mean_ms', '_sd_ms')}
+        assert set(result[name]) == {'estimation_ms', 'tracking_ms', 'both_ms'}
         assert all(len(times) == 2 and min(times) >= 0 for times in result[name].values())
         assert result[name]['estimation_ms'][1] > 0
-    assert len(result['ratio']) == 2 and result['growth'][1] == 1
-    text = '\n'.join(benchmark.table(result))
-    assert '%.2f' % result['thesis']['both_ms'][1] in text and '%.2f' % result['ratio'][0] in text
+    assert len(result['ratio']) == 2
 
 
 def test_both_algorithms_detect_and_track_everybody(session):

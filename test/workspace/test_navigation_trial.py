@@ -56,11 +56,11 @@ def test_a_recorded_trial_is_not_repeated(tmp_path, monkeypatch):
     monkeypatch.setattr('ros_3d_bb_lab.evaluation.navigation.benchmark.launch',
                         lambda *arguments: started.append(arguments))
     (tmp_path / 'standing-ours-3.json').write_text('{"collisions": 0}')
-    assert run_trial(('standing', 'ours', 3, str(tmp_path), OPTIONS)) == {
+    assert run_trial('standing', 'ours', 3, str(tmp_path), OPTIONS) == {
         'scene': 'standing', 'mode': 'ours', 'seed': 3, 'collisions': 0}
     assert not started
     with pytest.raises(RuntimeError, match='standing, ours, seed 4: no result'):
-        run_trial(('standing', 'ours', 4, str(tmp_path), OPTIONS))
+        run_trial('standing', 'ours', 4, str(tmp_path), OPTIONS)
     assert len(started) == 1
 
 

@@ -5,8 +5,6 @@ Recordings are resampled to each rate, with their true positions and with noise.
 without covariances, and learns the noise. The plain filter is its Kalman filter, extrapolated with its velocity and its
 acceleration; the constant velocity is that of the last `STEP_S` or of the last image, if that takes longer.
 """
-import argparse
-import csv
 import math
 import os
 from typing import NamedTuple
@@ -14,7 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb_lab.evaluation.defaults import data_folder, write_json
+from ros_3d_bb_lab.evaluation.defaults import data_folder, in_range
+from ros_3d_bb_lab.evaluation.text_table import line_of
+from ros_3d_bb_lab.evaluation.tracking.csv_tables import read_rows
 from ros_3d_bb_lab.evaluation.tracking.metrics import WITHIN_95
 from ros_3d_bb_lab.evaluation.tracking.prediction_benchmark import (HORIZON_S, PARAMS, predicted, step_velocity_mps,
                                                                     tracked)
@@ -27,7 +27,6 @@ STEP_S = 0.1
 OBSERVED_S, FEWEST_OBSERVED = 0.7, 3  # duration and number of images before predictions count
 KEYS = ('coverage_95_2s', 'ours_fde_2s_m', 'cv_fde_2s_m', 'area_95_2s_m2', 'nll_2s', 'plain_coverage_95_2s',
         'plain_fde_2s_m', 'plain_area_95_2s_m2', 'plain_nll_2s')
-TITLES = ('in 95 %', 'FDE, m', 'FDE, CV', 'area, m2', 'NLL', 'plain: 95 %', 'FDE, m', 'area, m2', 'NLL')
 ERRORS = ('distance', 'error_m', 'area_m2', 'nll')  # of a prediction with a covariance, see `_errors`
 
 
@@ -53,12 +52,7 @@ def read_clips(folder):
 
 
 def _clip(path):
-    with open(path, newline='', encoding='utf-8-sig') as stream:
-        try:
-            rows = np.array([[float(line[name]) for name in COLUMNS] for line in csv.DictReader(stream)])
-        except (KeyError, TypeError, ValueError, csv.Error) as error:
-            raise ValueError('%s cannot be read (%r); numbers in the columns %s expected'
-                             % (path, error, ','.join(COLUMNS)))
+    rows = np.array([list(row.values()) for row in read_rows(path, COLUMNS)])
     if len(rows) < 2 or not np.isfinite(rows).all() or not (np.diff(rows[:, 0]) > 0).all():
         raise ValueError('%s has no two finite rows with increasing timestamp' % path)
     return Clip(rows[:, 0], rows[:, 1:])
@@ -115,40 +109,28 @@ def _errors(future_m, mean_m, covariance_m2):
             distance / 2 + math.log(2 * math.pi) + math.log(determinant) / 2)
 
 
-def bench(folder, seed):
-    """Print the scores by kind, rate and noise. Returns {kind: scores}, as written by --json; those of all rates are in
+def run(arguments):
+    """Print the scores by kind, rate and noise. Returns {kind: scores}; those of all rates are in
     `rates.<rate>.<noise>` of a kind.
     """
+    if not arguments.data:
+        raise ValueError('no recordings found; --data DIR or ROS_3D_BB_DATA expected')
     result = {}
-    print('%-10s %5s %-10s' % ('kind', 'Hz', 'positions') + ''.join('%12s' % key for key in TITLES), flush=True)
-    for kind, clips in read_clips(folder).items():
+    for kind, clips in read_clips(arguments.data).items():
         rates = {}
         for rate_hz in RATES_HZ:
-            rates[str(rate_hz)] = {noise: scores_of(clips, rate_hz, noise_m, seed)
+            rates[str(rate_hz)] = {noise: scores_of(clips, rate_hz, noise_m, arguments.seed)
                                    for noise, noise_m in NOISES_M.items()}
             for noise, scores in rates[str(rate_hz)].items():
-                print('%-10s %5d %-10s' % (kind, rate_hz, noise) + ''.join(
-                    '%12s' % ('-' if scores[key] is None else '%.3f' % scores[key]) for key in KEYS), flush=True)
+                print(line_of('%s, %d Hz, %s:' % (kind, rate_hz, noise), **scores), flush=True)
         result[kind] = dict(rates[str(AS_RECORDED_HZ)]['true'], rates=rates)
     return result
 
 
-def main():
-    """Run the command `./run bench prediction`."""
-    arguments = _arguments()
-    write_json(arguments.json, bench(arguments.data, arguments.seed))
-
-
-def _arguments():
-    parser = argparse.ArgumentParser(prog='./run bench prediction', description=__doc__)
+def add_options(parser):
+    """Add the options of the command."""
     parser.add_argument('--data', default=data_folder('vru'), metavar='DIR',
                         help='folder with a folder of CSV files for each kind of motion, with the columns %s (default: '
                         '$ROS_3D_BB_DATA/data/vru if it exists)' % ','.join(COLUMNS))
-    parser.add_argument('--seed', type=int, default=0, metavar='N', help='random seed of the noise (default: 0)')
-    parser.add_argument('--json', metavar='FILE', help='also write the scores to FILE')
-    arguments = parser.parse_args()
-    if not arguments.data:
-        parser.error('no recordings found; --data DIR or ROS_3D_BB_DATA expected')
-    if not 0 <= arguments.seed < 2 ** 32:
-        parser.error('--seed is %d; 0 to %d expected' % (arguments.seed, 2 ** 32 - 1))
-    return arguments
+    parser.add_argument('--seed', type=in_range(int, 0, 2 ** 32 - 1), default=0, metavar='N',
+                        help='random seed of the noise (default: 0)')
