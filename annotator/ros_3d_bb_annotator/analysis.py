@@ -16,8 +16,8 @@ from ros_3d_bb_lab.evaluation.noise.tables import MeasurementTable, read_session
 class Analysed(NamedTuple):
     """Results of an analysis.
 
-    `text` contains mean error and spread of both axes. `model_note` is why there is no cross-validated error
-    model, and what there is instead, or empty. `outliers` were left out.
+    `text` contains mean error and spread of both axes. `model_note` is why there is no error model, or empty.
+    `outliers` were left out.
     """
 
     folder: str

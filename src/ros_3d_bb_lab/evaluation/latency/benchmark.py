@@ -9,7 +9,7 @@ import tempfile
 from typing import NamedTuple
 
 from ros_3d_bb_lab.evaluation.defaults import default_weights, describe_machine, in_range, scenario_path
-from ros_3d_bb_lab.evaluation.latency.latency_result import LIMIT, SUBSCRIBING, result_of
+from ros_3d_bb_lab.evaluation.latency.latency_result import LIMIT, result_of
 from ros_3d_bb_lab.evaluation.launching import launch
 from ros_3d_bb_lab.evaluation.text_table import line_of, table_of
 
@@ -59,8 +59,7 @@ def measured(case, arguments, bag, folder):
             raise RuntimeError('%s: nothing was measured. The log:\n%s' % (case.name, stream.read()))
     result = dict(name=case.name, detector=case.name.split('+')[0], load='one core' if case.loaded else 'none')
     result.update(result_of(recorded), load_average=recorded['load_average'])
-    nodes = [node for node in result['cpu_percent']
-             if node not in HARNESS and not node.endswith((LIMIT, SUBSCRIBING))]
+    nodes = [node for node in result['cpu_percent'] if node not in HARNESS and not node.endswith(LIMIT)]
     return dict(result, pipeline={key: sum(result[key][node] for node in nodes) for key in ('cpu_percent', 'rss_mb')})
 
 
