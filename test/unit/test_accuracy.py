@@ -14,8 +14,7 @@ from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb_lab.evaluation.accuracy import Estimates, boxes_of, compare, scores_of
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb_lab.simulation.scenario import read_scenario
-from ros_3d_bb_lab.simulation.simulator import Simulator
-from ros_3d_bb_lab.simulation.true_boxes import LEAST_SHOWN
+from ros_3d_bb_lab.simulation.simulator import LEAST_SHOWN, Simulator
 from support.error_models import MODEL
 from support.small_session import change_json, write_small_session
 

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ros_3d_bb_lab.simulation.collision import Rectangle
-from ros_3d_bb_lab.simulation.driving import limited_velocity, measured_velocity, moved
+from ros_3d_bb_lab.simulation.driven_world import limited_velocity
 from ros_3d_bb_lab.simulation.scenario import Drive
 
 DRIVE = Drive(speed=1.0, rate=2.0, acceleration=0.5, angular_acceleration=4.0)
@@ -25,14 +25,6 @@ def test_velocity_approaches_the_wanted_one_within_the_limits(wanted, after_1_s,
     np.testing.assert_allclose(velocities[100], after_1_s)
     np.testing.assert_allclose(velocity, at_last)
     assert (np.abs(np.diff(velocities, axis=0)) <= np.array([.5, 4]) * .01 + 1e-12).all()
-
-
-def test_odometry_drifts_with_the_distance_and_the_angle():
-    velocity = np.array([1.0, -.5])
-    measured = measured_velocity(velocity, (.1, -.2))
-    np.testing.assert_allclose(measured, (1.1, -.4))
-    np.testing.assert_allclose(moved(np.zeros(3), measured_velocity(np.array([2.0, 0]), (.1, 0)), 1.0), (2.2, 0, 0))
-    np.testing.assert_array_equal(measured_velocity(np.zeros(2), (.1, .1)), (0, 0))
 
 
 @given(rectangles, coordinates, coordinates)

@@ -55,25 +55,12 @@ def depth_detector(camera):
 
 
 def compare(session, detectors):
-    """Run detectors on the images of a session that have recorded boxes.
+    """Run detectors on the images of a session that have recorded boxes. Raises ValueError if there are none.
 
-    Parameters
-    ----------
-    session : session_reader.Session
-    detectors : dict
-        Functions of a color image (height, width, 3), RGB, and a DepthImage, by name. They return boxes (n, 4).
-
-    Returns
-    -------
-    dict
-        `frames`, their number; `boxes`, the number of their boxes; and `detectors`, by name: `found` boxes with an IoU
-        of at least 0.5, `median_iou` of all recorded boxes with the best detection (0 without), `false_boxes` without a
-        recorded box, and `cpu_ms`, the median of the CPU times.
-
-    Raises
-    ------
-    ValueError
-        If there is no image with a box.
+    `detectors` are functions, by name, of a color image and a DepthImage that return boxes (n, 4). Returns a
+    dictionary: `frames`, their number; `boxes`, the number of their boxes; and `detectors`, by name: `found` boxes with
+    an IoU of at least 0.5, `median_iou` of all recorded boxes with the best detection (0 without), `false_boxes`
+    without a recorded box, and `cpu_ms`, the median of the CPU times.
     """
     frames = annotated_frames(session)
     overlaps, false_boxes, times_ms = ({name: [] for name in detectors} for _result in range(3))

@@ -15,8 +15,7 @@ from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_pa
 from ros_3d_bb_lab.evaluation.scenes import run_scene, score_detections
 from ros_3d_bb_lab.evaluation.text_table import line_of
 from ros_3d_bb_lab.simulation.scenario import read_scenario
-from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
-from ros_3d_bb_lab.simulation.true_boxes import is_in_image, jittered_boxes
+from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator, is_in_image, jittered_boxes
 
 RANGE_M = {'yolov5': (2.0, 8.0), 'depth': (2.0, 6.0), 'exact': (0.5, 8.0)}  # evaluated range of each detector
 EVERY = {'yolov5': 2, 'depth': 2, 'exact': 1}  # every n-th image is used

@@ -5,12 +5,11 @@ import numpy as np
 
 from ros_3d_bb.estimation.error_model import write_error_model
 from ros_3d_bb.sessions.plausibility import position_text
-from ros_3d_bb_lab.evaluation.html_report import html_report
+from ros_3d_bb_lab.evaluation.html_report import Figure, Heading, Paragraph, Table, html_report, numbered
 from ros_3d_bb_lab.evaluation.noise.analysis import summary_of
 from ros_3d_bb_lab.evaluation.noise.figures import polynomial_text, write_figures
 from ros_3d_bb_lab.evaluation.noise.statistics import LEAST_TO_TEST
 from ros_3d_bb_lab.evaluation.noise.tables import LEAST_IN_CLUSTER, small_clusters
-from ros_3d_bb_lab.evaluation.report_blocks import Figure, Heading, Paragraph, Table, numbered
 
 TITLE = 'Position errors of a depth camera'
 ESTIMATORS = {'foreground': 'foreground (that of bbox3d_node)', 'median': 'median (that of the thesis)',

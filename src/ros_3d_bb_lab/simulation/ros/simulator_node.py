@@ -22,8 +22,7 @@ from ros_3d_bb.nodes.common.startup import SENDING_S, read_params, run_node, wai
 from ros_3d_bb_lab.simulation.ros.driven_robot import QUEUE_SIZE, DrivenRobot, robot_transforms
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import TRUTH_TOPIC, boxes_message, simulated_messages
 from ros_3d_bb_lab.simulation.scenario import read_scenario, with_overrides
-from ros_3d_bb_lab.simulation.simulator import STEP_S, Simulator
-from ros_3d_bb_lab.simulation.true_boxes import jittered_boxes
+from ros_3d_bb_lab.simulation.simulator import STEP_S, Simulator, jittered_boxes
 
 CLOCK_LEAD_NS = NS  # from the time published while waiting for subscribers to the first image
 PAUSE_NS = 3 * NS  # between repetitions of a scene; separates the people of successive repetitions
