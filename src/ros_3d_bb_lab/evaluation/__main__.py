@@ -9,7 +9,7 @@ import json
 import subprocess
 import sys
 
-MODULES = {'accuracy': 'accuracy', 'tracking': 'tracking.benchmark', 'prediction': 'tracking.motion_benchmark',
+MODULES = {'accuracy': 'accuracy', 'tracking': 'tracking.benchmark', 'prediction': 'tracking.prediction_benchmark',
            'scenes': 'scene_benchmark', 'speed': 'speed', 'latency': 'latency.benchmark',
            'detector': 'detector_benchmark', 'costmap': 'costmap.benchmark', 'laser': 'costmap.laser_benchmark',
            'navigation': 'navigation.benchmark', 'gazebo': 'gazebo.benchmark'}
