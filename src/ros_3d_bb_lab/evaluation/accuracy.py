@@ -41,9 +41,8 @@ def boxes_of(session, weights=None):
             raise ValueError('frame %s has no 2D box; all frames with ground truth need one' % frame.id)
     if weights is None:
         return [frame.boxes_px[0] for frame in session.frames]
-    from ros_3d_bb.detection.network_detector import NetworkDetector
-    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime  # may import torch (slow)
-    detector, chosen = NetworkDetector(open_runtime(weights, RuntimeParams(device='cpu'))), []
+    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_detector  # may import torch (slow)
+    detector, chosen = open_detector(weights, running=RuntimeParams(device='cpu')), []
     for frame in session.frames:
         boxes = detector.detect(read_color(frame, session.camera)).boxes
         overlaps = iou(frame.boxes_px[0], boxes)

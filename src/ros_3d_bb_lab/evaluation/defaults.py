@@ -26,12 +26,24 @@ def scenario_path(name):
         if os.path.isfile(path):
             return path
     raise argparse.ArgumentTypeError('no scenario %r; a file, or one of %s expected'
-                                     % (name, ', '.join(os.path.basename(path)[:-5] for path in scenario_paths('*'))))
+                                     % (name, ', '.join(map(scene_name, scenario_paths('*')))))
 
 
-def scenario_paths(*patterns):
-    """Paths of the scenarios in config/scenarios whose names match a pattern, in the order of the patterns."""
-    return [path for pattern in patterns for path in sorted(glob.glob(os.path.join(SCENARIOS, pattern + '.yaml')))]
+def scenario_paths(pattern):
+    """Paths of the scenarios in config/scenarios whose names match a pattern."""
+    return sorted(glob.glob(os.path.join(SCENARIOS, pattern + '.yaml')))
+
+
+def scene_name(path):
+    """Name of the scenario in a file."""
+    return os.path.splitext(os.path.basename(path))[0]
+
+
+def add_scenarios(parser, *patterns):
+    """Add scenarios to the options of a benchmark; by default those whose names match a pattern."""
+    parser.add_argument('scenarios', nargs='*', type=scenario_path, metavar='SCENARIO',
+                        default=[path for pattern in patterns for path in scenario_paths(pattern)],
+                        help='names in config/scenarios or files (default: %s)' % ', '.join(patterns))
 
 
 def in_range(kind, low, high=float('inf')):

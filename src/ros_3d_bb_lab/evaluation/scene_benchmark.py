@@ -1,6 +1,4 @@
 """Benchmark of the pipeline on simulated scenes with different detectors, against ground truth."""
-import os
-
 import numpy as np
 
 from ros_3d_bb.camera.depth_image import DepthImage
@@ -11,7 +9,7 @@ from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb_lab.evaluation.clear_mot import ClearMatcher, score
-from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_path, scenario_paths
+from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, add_scenarios, scene_name
 from ros_3d_bb_lab.evaluation.scenes import run_scene, score_detections
 from ros_3d_bb_lab.evaluation.text_table import line_of
 from ros_3d_bb_lab.simulation.scenario import read_scenario
@@ -33,9 +31,8 @@ def depth_detector(simulator):
 
 def yolov5_detector(weights):
     """YOLOv5 detector for `run_scene` from a checkpoint. Raises ValueError if the checkpoint cannot be used."""
-    from ros_3d_bb.detection.network_detector import NetworkDetector
-    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime  # may import torch (slow)
-    detector = NetworkDetector(open_runtime(weights, RuntimeParams(device='cpu')))
+    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_detector  # may import torch (slow)
+    detector = open_detector(weights, running=RuntimeParams(device='cpu'))
     return lambda frame: detector.detect(frame.color)
 
 
@@ -131,15 +128,13 @@ def run(arguments):
 
 def add_options(parser):
     """Add the options of the command."""
-    parser.add_argument('scenarios', nargs='*', type=scenario_path, metavar='SCENARIO',
-                        default=scenario_paths('thesis_*', 'approach_*'),
-                        help='names in config/scenarios or files (default: thesis_*, approach_*)')
+    add_scenarios(parser, 'thesis_*', 'approach_*')
     parser.add_argument('--weights', help='checkpoint or export of YOLOv5; without it, YOLOv5 is not run')
 
 
 def _run(path, yolov5):
     """Run one scene with each detector and print the results. The error model applies only to the boxes of `exact`."""
-    name, simulator, results = os.path.basename(path).replace('.yaml', ''), Simulator(read_scenario(path)), []
+    name, simulator, results = scene_name(path), Simulator(read_scenario(path)), []
     for detector, detect, model in (('depth', depth_detector(simulator), None), ('yolov5', yolov5, None),
                                     ('exact', exact_detector(simulator), read_error_model(SIMULATED_ERROR_MODEL))):
         if detect is not None:

@@ -16,6 +16,7 @@ import numpy as np
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from, transform_points
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.estimation.box3d import ImageGeometry, plausible
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimate_median, estimator_named, sample_depth
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
@@ -191,10 +192,9 @@ def detector_speed(images, weights, runtimes=('torch', 'onnxruntime'), sizes=(64
 
 
 def _detector(weights, runtime, size):
-    from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetector
-    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime
+    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_detector
     running = RuntimeParams(runtime=runtime, device='cpu', threads=1)
-    return NetworkDetector(open_runtime(weights, running), DetectionParams(image_size=size))
+    return open_detector(weights, DetectionParams(image_size=size), running)
 
 
 def _detector_time_ms(detector, image):

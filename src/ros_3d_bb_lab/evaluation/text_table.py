@@ -14,8 +14,8 @@ def line_of(*values, **named):
 def table_of(rows):
     """Lines of a table, given its rows as {name: {column: value}}; values that are collections are left out."""
     columns = [key for key, value in next(iter(rows.values())).items() if not isinstance(value, (dict, list))]
-    return lines_of([''] + columns, [[str(name)] + [text_of(row.get(key)) for key in columns]
-                                     for name, row in rows.items()])
+    texts = [[str(name)] + [text_of(row.get(key)) for key in columns] for name, row in rows.items()]
+    return lines_of([''] + list(map(str, columns)), texts)
 
 
 def lines_of(header, rows):

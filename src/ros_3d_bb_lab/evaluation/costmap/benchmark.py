@@ -25,7 +25,7 @@ from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb_lab.evaluation.costmap.costmap_score import Costmap, Sighting, score_costmaps
-from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, describe_machine, scenario_path
+from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, add_scenarios, describe_machine, scene_name
 from ros_3d_bb_lab.evaluation.launching import free_port, running_roslaunch
 from ros_3d_bb_lab.evaluation.scene_benchmark import RANGE_M, depth_detector, yolov5_detector
 from ros_3d_bb_lab.evaluation.scenes import run_scene
@@ -63,11 +63,11 @@ class Scene(NamedTuple):
     range_m: Tuple[float, float]
 
 
-def tracked_scene(name, path, yolov5=None):
+def tracked_scene(path, yolov5=None):
     """Render and track the scenario in a file with the depth detector or the one given."""
     simulator = Simulator(read_scenario(path))
     steps = run_scene(simulator, yolov5 or depth_detector(simulator), 1, read_error_model(SIMULATED_ERROR_MODEL))
-    return Scene(name, simulator, steps, RANGE_M['yolov5' if yolov5 else 'depth'])
+    return Scene(scene_name(path), simulator, steps, RANGE_M['yolov5' if yolov5 else 'depth'])
 
 
 def sightings_of(scene):
@@ -167,7 +167,7 @@ def run(arguments):
     """Score the costmaps of each scene."""
     print(describe_machine(), flush=True)
     yolov5 = yolov5_detector(arguments.weights) if arguments.weights else None
-    scenes = [tracked_scene(name, path, yolov5) for name, path in arguments.scenes.items()]
+    scenes = [tracked_scene(path, yolov5) for path in arguments.scenarios]
     results = {}
     with running_nodes():
         rospy.init_node('costmap_benchmark', disable_signals=True)
@@ -194,15 +194,4 @@ def running_nodes(launch=LAUNCH):
 def add_options(parser):
     """Add the options of the command."""
     parser.add_argument('--weights', help='checkpoint or export of YOLOv5; without it, people are detected in depth')
-    add_scenes(parser)
-
-
-def add_scenes(parser):
-    """Add the option --scenes."""
-    parser.add_argument('--scenes', type=scenario_paths, default=','.join(SCENES), metavar='A,B',
-                        help='names in config/scenarios or files, separated by commas (default: %(default)s)')
-
-
-def scenario_paths(names):
-    """{name: path} of scenarios that are separated by commas."""
-    return {name: scenario_path(name) for name in names.split(',')}
+    add_scenarios(parser, *SCENES)

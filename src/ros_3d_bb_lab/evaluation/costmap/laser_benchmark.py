@@ -9,8 +9,8 @@ from sensor_msgs.msg import LaserScan
 
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb_lab.evaluation.costmap.benchmark import Player, add_scenes, running_nodes, tracked_scene
-from ros_3d_bb_lab.evaluation.defaults import describe_machine
+from ros_3d_bb_lab.evaluation.costmap.benchmark import SCENES, Player, running_nodes, tracked_scene
+from ros_3d_bb_lab.evaluation.defaults import add_scenarios, describe_machine
 from ros_3d_bb_lab.evaluation.text_table import line_of
 from ros_3d_bb_lab.simulation.laser import FIELD_OF_VIEW, planar_pose, rectangles_of, scan_ranges
 from ros_3d_bb_lab.simulation.ros.driven_robot import scan_to_msg
@@ -96,7 +96,7 @@ def result_of(scene, costmaps, with_people):
 def run(arguments):
     """Count the cells in the costmaps of each scene."""
     print(describe_machine(), flush=True)
-    scenes = [tracked_scene(name, path) for name, path in arguments.scenes.items()]
+    scenes = [tracked_scene(path) for path in arguments.scenarios]
     results = {}
     with running_nodes(LAUNCH % ''.join(COSTMAP % item for item in NODES.items())):
         rospy.init_node('laser_benchmark', disable_signals=True)
@@ -111,4 +111,6 @@ def run(arguments):
     return {'machine': describe_machine(), 'scenes': results}
 
 
-add_options = add_scenes
+def add_options(parser):
+    """Add the options of the command."""
+    add_scenarios(parser, *SCENES)

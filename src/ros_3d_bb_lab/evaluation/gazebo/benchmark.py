@@ -15,7 +15,7 @@ from ros_3d_bb.conversions.perception_msgs import NEWEST, TRACKS_TOPIC, stamp_of
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import VISIBLE, CameraView
 from ros_3d_bb_lab.evaluation.clear_mot import Moment, score
-from ros_3d_bb_lab.evaluation.defaults import describe_machine, scenario_path, scenario_paths
+from ros_3d_bb_lab.evaluation.defaults import add_scenarios, describe_machine, scene_name
 from ros_3d_bb_lab.evaluation.gazebo.people_truth import PREDICTION_S, PeopleTruth
 from ros_3d_bb_lab.evaluation.launching import free_port, running_roslaunch
 from ros_3d_bb_lab.evaluation.scene_benchmark import score_tracks
@@ -130,20 +130,18 @@ def run(arguments):
 
 def add_options(parser):
     """Add the options of the command."""
-    parser.add_argument('scenarios', nargs='*', type=scenario_path, metavar='SCENARIO',
-                        default=scenario_paths('thesis_*'),
-                        help='names in config/scenarios or files (default: thesis_*)')
+    add_scenarios(parser, 'thesis_*')
     parser.add_argument('--weights', metavar='FILE', help='network of yolov5_node; without it, depth_detector_node')
 
 
 def _run(path, detector):
-    name, results = os.path.basename(path).replace('.yaml', ''), []
+    results = []
     with tempfile.TemporaryDirectory() as folder:
         recorded = record_scene(read_scenario(path), folder)
         for tracker in TRACKERS:
             target = os.path.join(folder, tracker + '.bag')
             run_pipeline(recorded, target, tracker, detector)
             result = result_of(moments_in(recorded, target, int((START_S + SETTLING_S) * NS)))
-            print(line_of(name, tracker, **result), flush=True)
-            results.append(dict(result, scene=name, tracker=tracker))
+            results.append(dict(result, scene=scene_name(path), tracker=tracker))
+            print(line_of(**results[-1]), flush=True)
     return results
