@@ -112,13 +112,6 @@ def test_a_spread_that_decreases_with_range_is_written_in_full(tmp_path, monkeyp
     assert '<td>√(%.4f² + (0.00000 z²)² + (%.4f / z)²)</td>' % (spread.constant_m, spread.near_m2) in page
 
 
-def test_too_few_ranges_are_named(tmp_path, monkeypatch):
-    rows = [[x, x, z, z] for z in (1500, 2000) for x in (-500, 0, 500)]
-    table = write_table(tmp_path / 'table.csv', rows, COLUMNS[:4])
-    with pytest.raises(SystemExit, match='table.csv: .* 3 values of Z true needed; there are 3 at 1.5 m, 3 at 2 m'):
-        run(monkeypatch, '--z', table, '--x', table, '--out', tmp_path / 'out')
-
-
 def test_a_mean_error_above_the_standard_deviation_is_named_at_any_range(tmp_path, monkeypatch):
     places = (1500, 25, 1), (2000, 30, 20), (3000, 30, 20)
     rows = [[x + error, x, z + bias + scale * error, z] for z, bias, scale in places

@@ -53,32 +53,19 @@ def test_errors_name_the_path_of_a_key(where, name):
 # The second to last entry is the value in the message, the last one the limit or type that is expected.
 @pytest.mark.parametrize('where,name,value,quoted,expected', [
     ('scenario', 'duration', 0, '0', 'more than 0'),
-    ('scenario', 'rate', -15, '-15', 'more than 0'),
     ('scenario', 'rate', 5000, '5000', '1000'),
     ('scenario', 'seed', -1, '-1', 'integer'),
     ('scenario', 'seed', 1.5, '1.5', 'integer'),
-    ('scenario', 'seed', 2 ** 32, '4294967296', '4294967295'),
     ('scenario', 'seed', True, 'True', 'number'),
     ('scenario', 'depth_noise', 1, '1', 'true'),
     ('scenario', 'color_noise', -1, '-1', 'at least 0'),
     ('scenario', 'people', {}, '{}', 'list'),
-    ('scenario.room', 'height', 0, '0', 'more than 0'),
     ('scenario.room', 'bounds', [0, 1, 2], '[0, 1, 2]', '4 numbers'),
-    ('scenario.room.furniture[2]', 'size', [1, 1, 0], '0', 'more than 0'),
     ('scenario.room.furniture[2]', 'color', [1, 2, 256], '256', '255'),
-    ('scenario.robot', 'mount', [0, 0], '[0, 0]', '3 numbers'),
     ('scenario.robot.cameras[1]', 'name', 'the front', "'the front'", 'name'),
-    ('scenario.robot.follow', 'distance', -1, '-1', 'more than 0'),
-    ('scenario.robot.follow', 'person', .5, '0.5', 'integer'),
     ('scenario.people[1]', 'crouch', 1.1, '1.1', '0 to 1'),
-    ('scenario.robot.drive', 'acceleration', 0, '0', 'more than 0'),
-    ('scenario.robot.drive', 'footprint', [.5, 0], '0', 'more than 0'),
     ('scenario.robot.drive', 'odometry_error', [1.0, 0], '1.0', 'less than 1'),
-    ('scenario.people[1]', 'hips', -.1, '-0.1', '0 to 1'),
-    ('scenario.people[1]', 'girth', 0, '0', 'more than 0'),
-    ('scenario.people[1]', 'shirt', [-1, 0, 0], '-1', '255'),
-    ('scenario.people[1].moves[1]', 'wait', -1, '-1', 'at least 0'),
-    ('scenario.people[1].moves[1]', 'speed', 0, '0', 'more than 0')])
+    ('scenario.people[1].moves[1]', 'wait', -1, '-1', 'at least 0')])
 def test_the_error_of_a_value_out_of_range_names_path_value_and_limit(where, name, value, quoted, expected):
     key, _verb, rest = error_of(content_with(where, name, value)).split(' ', 2)
     assert key.partition('[')[0] == ('%s.%s' % (where, name)).partition('[')[0] and name in key
