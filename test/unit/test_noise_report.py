@@ -85,7 +85,7 @@ def test_a_session_is_analysed_in_the_same_way(session_folder, tmp_path, monkeyp
     assert 'report.html' in capsys.readouterr().out
     page = (tmp_path / 'out' / 'report.html').read_text(encoding='utf-8')
     camera = read_session(session_folder).camera
-    assert 'fx %.2f, fy %.2f' % camera[2:4] in page and 'leave-one-position-out' in page
+    assert 'fx %.2f, fy %.2f' % camera[2:4] in page and 'Leave-one-position-out' in page
     assert datetime.date.today().isoformat() in page
 
 
