@@ -79,7 +79,7 @@ def test_time_and_tf_are_published_every_20_ms_and_at_the_images(round_of_scene)
 
 @pytest.mark.parametrize('params,reason', [
     ((), 'no scenario given'), (('scenario:=/nowhere.yaml',), '/nowhere.yaml'),
-    (('scenario:=' + os.devnull, 'speed:=0'), '~speed is 0'), (('scenario:=x', 'speed:=2.0'), 'publish_clock'),
+    (('scenario:=' + os.devnull, 'seed:=-2'), '~seed is -2'), (('scenario:=x', 'supervised:=true'), 'publish_clock'),
     (('scenario:=' + os.devnull, 'rate:=-5.0'), 'rate is -5')])
 def test_invalid_parameters_are_rejected_at_the_start(path, params, reason):
     process = started('simulator_node', *params)

@@ -1,7 +1,6 @@
 """The benchmark of navigation: what each mode starts, and one trial under roslaunch."""
 import argparse
 import json
-import os
 import subprocess
 import sys
 
@@ -80,12 +79,3 @@ def test_a_robot_that_knows_nothing_of_people_drives_into_one(tmp_path):
     assert row['stops'] >= 1
     assert row['time_to_goal_s'] is None and -0.03 < row['min_distance_m'] < 0.03
     assert processes_naming(str(logs)) == 0
-
-
-def test_without_move_base_the_benchmark_says_so(tmp_path):
-    paths = [path for path in os.environ.get('ROS_PACKAGE_PATH', '').split(os.pathsep) if 'planners-' not in path]
-    process = subprocess.run([sys.executable, '-m', 'ros_3d_bb_lab.evaluation', 'navigation', '--runs', '1'],
-                             env=dict(os.environ, ROS_PACKAGE_PATH=os.pathsep.join(paths)), stdout=subprocess.PIPE,
-                             stderr=subprocess.STDOUT, universal_newlines=True)
-    assert process.returncode == 1 and 'move_base is not installed' in process.stdout
-    assert 'Traceback' not in process.stdout

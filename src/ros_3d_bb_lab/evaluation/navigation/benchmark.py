@@ -3,7 +3,6 @@ import argparse
 import json
 import os
 import signal
-import subprocess
 import sys
 import tempfile
 
@@ -58,7 +57,6 @@ def run(arguments):
         raise ValueError('--detector %s: exact, depth or the path of a file expected' % arguments.detector)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # runs the cleanup, which ends all processes
     print(describe_machine(), flush=True)
-    _check_planners(arguments.planner)
     trials = []
     with tempfile.TemporaryDirectory() as folder:
         for seed in range(1, arguments.runs + 1):
@@ -70,14 +68,6 @@ def run(arguments):
     rows = {'%s %s' % (scene, mode): row for scene, modes in result['scenes'].items() for mode, row in modes.items()}
     print('\n'.join(table_of(dict(rows, **result['all']))))
     return result
-
-
-def _check_planners(planner):
-    for package in ['move_base'] + ['teb_local_planner'] * (planner == 'teb'):
-        if subprocess.call(['rospack', 'find', package], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) != 0:
-            raise RuntimeError('%s is not installed; install ros-noetic-navigation and ros-noetic-teb-local-planner, '
-                               'or set ROS_3D_BB_DATA to a folder that contains planners/, from which ./run builds '
-                               'them' % package)
 
 
 def add_options(parser):
