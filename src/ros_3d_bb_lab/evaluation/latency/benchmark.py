@@ -13,7 +13,7 @@ from ros_3d_bb_lab.evaluation.latency.latency_result import LIMIT, result_of
 from ros_3d_bb_lab.evaluation.launching import launch
 from ros_3d_bb_lab.evaluation.text_table import line_of, table_of
 
-IMAGES = 60  # first images of the scene, played forwards and backwards: 2 s, 90 MB
+IMAGES = 60  # first images of the demo, played forwards and backwards: 2 s, 90 MB
 BUSY_LOOP = 'import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n    pass'
 # Nodes of the benchmark, which do not run on a robot.
 HARNESS = 'replay_node', 'latency_probe_node', 'rosout', 'limit_audience'
@@ -99,7 +99,7 @@ def run(arguments):
         bag = arguments.bag and os.path.abspath(arguments.bag)
         if not bag:
             bag = os.path.join(folder, 'images.bag')
-            subprocess.check_call(['rosrun', 'ros_3d_bb', 'scenario_to_bag', arguments.scenario, bag, '--boxes',
+            subprocess.check_call(['rosrun', 'ros_3d_bb', 'scenario_to_bag', scenario_path('demo'), bag, '--boxes',
                                    '--images', str(IMAGES), '--compression', 'none'], stdout=subprocess.DEVNULL)
         for case in cases:
             results.append(measured(case, arguments, bag, folder))
@@ -131,10 +131,8 @@ def add_options(parser):
     parser.add_argument('--weights', nargs='+', default=list(filter(None, [default_weights()])), metavar='FILE',
                         help='checkpoint or export of YOLOv5, and further model files, which are cases named by the '
                         'file without suffix (default: yolov5n.pt in the cache, if any)')
-    images = parser.add_mutually_exclusive_group()
-    images.add_argument('--scenario', type=scenario_path, default='demo', metavar='SCENARIO',
-                        help='scenario; its first %d images are played (default: demo)' % IMAGES)
-    images.add_argument('--bag', help='bag written by scenario_to_bag or session_to_bag with --boxes')
+    parser.add_argument('--bag', help='bag written by scenario_to_bag or session_to_bag with --boxes (default: the '
+                        'first %d images of the demo)' % IMAGES)
     parser.add_argument('--limits', action='store_true',
                         help='also give the CPU usage of each node as a multiple of its limit: that of a bare rospy '
                         'node that runs beside it, receives the same messages and publishes messages of the same size')
