@@ -59,7 +59,7 @@ def run(arguments):
     print(describe_machine(), flush=True)
     trials = []
     with tempfile.TemporaryDirectory() as folder:
-        for seed in range(1, arguments.runs + 1):
+        for seed in range(arguments.seed, arguments.seed + arguments.runs):
             for scene in arguments.scenes:
                 for mode in arguments.modes:
                     trials.append(run_trial(scene, mode, seed, os.path.abspath(arguments.logs or folder), arguments))
@@ -73,7 +73,9 @@ def run(arguments):
 def add_options(parser):
     """Add the options of the command."""
     parser.add_argument('--runs', type=in_range(int, 1), default=20, metavar='N',
-                        help='trials per scene and mode, with the seeds from 1 on (default: 20)')
+                        help='trials per scene and mode (default: 20)')
+    parser.add_argument('--seed', type=in_range(int, 0), default=1, metavar='N',
+                        help='seed of the first trial (default: 1)')
     parser.add_argument('--scenes', type=_names_of(SCENES), default=list(SCENES), metavar='A,B',
                         help='some of %s' % ', '.join(SCENES))
     parser.add_argument('--modes', type=_names_of(MODES), default=list(MODES), metavar='A,B',
