@@ -12,8 +12,8 @@ from ros_3d_bb_lab.evaluation.noise.tables import read_session_measurements
 class Analysed(NamedTuple):
     """Results of an analysis.
 
-    `text` contains mean error and spread of both axes. `model_note` is why there is no cross-validated error
-    model, and what there is instead, or empty. `outliers` were left out.
+    `text` contains mean error and spread of both axes. `model_note` is why there is no error model, or empty.
+    `outliers` were left out.
     """
 
     folder: str

@@ -111,7 +111,7 @@ def test_time_and_tf_are_published_every_20_ms_and_at_the_images(tmp_path):
 
 @pytest.mark.parametrize('params, reason', [
     ((), 'no scenario given'), (('scenario:=/nowhere.yaml',), '/nowhere.yaml'),
-    (('scenario:=x', 'speed:=2.0'), 'publish_clock')])
+    (('scenario:=x', 'supervised:=true'), 'publish_clock')])
 def test_invalid_parameters_are_rejected_at_the_start(params, reason):
     output, _none = started('simulator_node', *params).communicate(timeout=30)
     assert reason in output and 'Traceback' not in output

@@ -14,7 +14,7 @@ from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
-from ros_3d_bb_lab.simulation.driving import moved
+from ros_3d_bb_lab.simulation.driven_world import moved
 from ros_3d_bb_lab.simulation.simulator import upright
 from support.ros import Recorder, header_at
 from support.two_cameras import boxes

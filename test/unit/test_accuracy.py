@@ -14,8 +14,7 @@ from ros_3d_bb_lab.evaluation.accuracy import Estimates, boxes_of, compare, scor
 from ros_3d_bb_lab.evaluation.defaults import scenario_path
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb_lab.simulation.scenario import read_scenario
-from ros_3d_bb_lab.simulation.simulator import Simulator
-from ros_3d_bb_lab.simulation.true_boxes import LEAST_SHOWN
+from ros_3d_bb_lab.simulation.simulator import LEAST_SHOWN, Simulator
 
 REAL_WEIGHTS = pytest.mark.needs(*['torch'] * bool(DATA))
 PLACES = np.repeat([(0.0, 1.0), (0.5, 2.0), (-1.0, 3.0)], 4, axis=0)

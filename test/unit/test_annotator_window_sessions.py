@@ -86,4 +86,4 @@ def test_export_and_analysis(window_on, monkeypatch, tmp_path):
     driver.wait_for(lambda: opened)
     assert opened == [os.path.join(folder, 'analysis', 'report.html')] and os.path.exists(opened[0])
     assert driver.window.results.analysed.model_note  # the bias is too steep
-    assert 'no cross-validated error model' in driver.window.statusBar().currentMessage()
+    assert 'no error_model.yaml is written' in driver.window.statusBar().currentMessage()

@@ -6,7 +6,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.planning.following import Follower, FollowParams, TargetSelector, is_new_goal
 from ros_3d_bb.planning.safe_speed import SafeSpeedParams
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
-from ros_3d_bb_lab.simulation.driving import moved
+from ros_3d_bb_lab.simulation.driven_world import moved
 from ros_3d_bb_lab.simulation.simulator import upright
 from support.tracks import track_at
 

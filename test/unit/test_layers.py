@@ -1,4 +1,4 @@
-"""Which folder may import what, without cycles. The docstring of a folder's __init__.py says the same in words."""
+"""Which folder may import what, without cycles."""
 import ast
 import functools
 import os

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ros_3d_bb_lab.simulation.collision import Rectangle
-from ros_3d_bb_lab.simulation.driving import limited_velocity
+from ros_3d_bb_lab.simulation.driven_world import limited_velocity
 from ros_3d_bb_lab.simulation.scenario import Drive
 
 DRIVE = Drive(speed=1.0, rate=2.0, acceleration=0.5, angular_acceleration=4.0)

@@ -1,6 +1,5 @@
 """The runs and trackers of the benchmark, and the command."""
 import json
-import sys
 
 import numpy as np
 import pytest
@@ -8,9 +7,9 @@ import pytest
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
 from ros_3d_bb.tracking.types import Detection
+from ros_3d_bb_lab.evaluation import __main__ as command
 from ros_3d_bb_lab.evaluation.baselines.oracle_association import outputs_with_perfect_association
 from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker
-from ros_3d_bb_lab.evaluation.tracking import benchmark
 from ros_3d_bb_lab.evaluation.tracking.benchmark import outputs_of
 from ros_3d_bb_lab.evaluation.tracking.detection_generator import DOUBLE, FALSE
 from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
@@ -61,17 +60,12 @@ def test_perfect_association_has_fewer_id_switches_and_false_positives():
         assert len(set(thing.id for thing in things)) == len(things) >= len(set(image.sources) - {FALSE, DOUBLE})
 
 
-def run_command(monkeypatch, *arguments):
-    monkeypatch.setattr(sys, 'argv', ['./run bench tracking'] + list(arguments))
-    benchmark.main()
-
-
 @pytest.mark.slow
 @pytest.mark.needs('norfair', 'trackeval')
 def test_the_command_writes_settings_and_scores(monkeypatch, tmp_path, capsys):
     monkeypatch.delenv('ROS_3D_BB_DATA', raising=False)
     path = tmp_path / 'scores.json'
-    run_command(monkeypatch, '--seed', '5', '--seconds', '2', '--repetitions', '1', '--json', str(path))
+    command.main(['tracking', '--seed', '5', '--seconds', '2', '--repetitions', '1', '--json', str(path)])
     result = json.loads(path.read_text())
     assert result['sequences'] == ['made_sparse', 'made_dense'] and result['seed'] == 5 and not result['recorded']
     assert result['command'].startswith('./run bench tracking --seed 5 ')

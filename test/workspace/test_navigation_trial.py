@@ -25,8 +25,8 @@ def test_modes_differ_in_what_move_base_knows_of_people(mode):
     assert (['ground_truth', 'ros_3d_bb/tracks'] in nodes['simulator_node'].remap_args) == (mode == 'truth')
     layers = [layer['name'] for layer in parameters['/move_base/local_costmap/plugins']]
     assert layers == ['static_layer'] + {
-        'depth': ['obstacle_layer', 'inflation_layer'], 'laser': ['obstacle_layer', 'inflation_layer'],
-        'none': ['inflation_layer']}.get(mode, ['people_layer', 'prediction_layer'])
+        mode: ['obstacle_layer', 'inflation_layer'] for mode in ('depth', 'laser', 'none')}.get(
+            mode, ['people_layer', 'prediction_layer'])
     assert parameters['/move_base/DWAPlannerROS/sum_scores'] == (mode not in ('depth', 'laser', 'none'))
     waits_for = [name for name in ('tracks', 'cloud', 'scan') if parameters['/navigation_trial_node/' + name]]
     assert waits_for == {'depth': ['cloud'], 'laser': ['scan'], 'limited': ['tracks', 'scan'],

@@ -142,7 +142,7 @@ def test_detectors_are_compared(reader, clone, data):
     outputs = outputs_of('yolox', [(0, 0, 30, 30)], [[1] * 80], (96, 128))
     write_constant_network(reader.home / 'yolox_nano.onnx', outputs)
     printed = reader.types(DETECTORS, clone, appended=' --every 50', ROS_3D_BB_DATA=data)
-    assert re.search(r'^yolox_nano.onnx  *0 .*^depth ', printed, re.DOTALL | re.MULTILINE)
+    assert re.search(r'^ *yolox_nano.onnx  *0 .*^ *depth ', printed, re.DOTALL | re.MULTILINE)
 
 
 def test_stamp_and_frame_in_the_layout_of_2d_boxes():

@@ -1,31 +1,41 @@
 """Command line of the benchmarks: `python3 -m ros_3d_bb_lab.evaluation NAME [OPTION ...]`, called by `./run bench`.
 
-Errors that a benchmark raises are printed here.
+A benchmark is a module with `add_options(parser)` and `run(arguments)`, which prints and returns its result, a
+dictionary. Errors that it raises are printed here.
 """
+import argparse
 import importlib
+import json
 import subprocess
 import sys
 
-MODULES = {'accuracy': 'accuracy', 'tracking': 'tracking.benchmark', 'prediction': 'tracking.motion_benchmark',
+MODULES = {'accuracy': 'accuracy', 'tracking': 'tracking.benchmark', 'prediction': 'tracking.prediction_benchmark',
            'scenes': 'scene_benchmark', 'speed': 'speed', 'latency': 'latency.benchmark',
            'detector': 'detector_benchmark', 'costmap': 'costmap.benchmark', 'laser': 'costmap.laser_benchmark',
            'navigation': 'navigation.benchmark', 'gazebo': 'gazebo.benchmark'}
 
 
-def main():
-    """Run the benchmark named by the first argument."""
-    name = sys.argv[1] if len(sys.argv) > 1 else ''
+def main(words):
+    """Run the benchmark named by the first word, with the others as its options."""
+    name = words[0] if words else ''
     if name not in MODULES:
         sys.stderr.write('./run bench: unknown benchmark %r; %s expected\n' % (name, ', '.join(sorted(MODULES))))
         return 2
-    sys.argv = ['./run bench ' + name] + sys.argv[2:]
+    module = importlib.import_module('ros_3d_bb_lab.evaluation.' + MODULES[name])
+    parser = argparse.ArgumentParser(prog='./run bench ' + name, description=module.__doc__)
+    module.add_options(parser)
+    parser.add_argument('--json', metavar='FILE', help='also write the result to FILE')
+    arguments = parser.parse_args(words[1:])
     try:
-        return importlib.import_module('ros_3d_bb_lab.evaluation.' + MODULES[name]).main()
+        result = module.run(arguments)
+        if arguments.json:
+            with open(arguments.json, 'w') as stream:
+                json.dump(dict(result, command='./run bench ' + ' '.join(words)), stream, indent=1)
     except KeyboardInterrupt:
         return 130
     except (ValueError, OSError, RuntimeError, subprocess.SubprocessError) as error:
-        sys.exit('%s: %s' % (sys.argv[0], error))
+        sys.exit('%s: %s' % (parser.prog, error))
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))

@@ -4,7 +4,6 @@ Without an error model, each position is corrected by a model fitted to all othe
 always corrected in this way if there are enough positions. Recorded estimates are not corrected; frames without a box
 are skipped.
 """
-import argparse
 from typing import Any, NamedTuple, Optional
 
 import numpy as np
@@ -14,8 +13,9 @@ from ros_3d_bb.estimation.box3d import plausible, truncated_edges
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.estimation.error_model import read_error_model, write_error_model
 from ros_3d_bb.sessions.session_reader import annotated_people, read_color, read_depth, read_session
-from ros_3d_bb_lab.evaluation.defaults import data_folder, default_weights, write_json
+from ros_3d_bb_lab.evaluation.defaults import data_folder, default_weights
 from ros_3d_bb_lab.evaluation.error_model_fit import coverage, data_of, fit_error_model, held_out
+from ros_3d_bb_lab.evaluation.text_table import line_of, table_of, transposed
 
 LENGTHS = ('rmse_x_m', 'rmse_z_m', 'rmse_plane_m', 'p95_plane_m', 'bias_x_m', 'bias_z_m', 'repeatability_x_m',
            'repeatability_z_m', 'rmse_x_truncated_m')
@@ -41,9 +41,8 @@ def boxes_of(session, weights=None):
             raise ValueError('frame %s has no 2D box; all frames with ground truth need one' % frame.id)
     if weights is None:
         return [frame.boxes_px[0] for frame in session.frames]
-    from ros_3d_bb.detection.network_detector import NetworkDetector
-    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime  # may import torch (slow)
-    detector, chosen = NetworkDetector(open_runtime(weights, RuntimeParams(device='cpu'))), []
+    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_detector  # may import torch (slow)
+    detector, chosen = open_detector(weights, running=RuntimeParams(device='cpu')), []
     for frame in session.frames:
         boxes = detector.detect(read_color(frame, session.camera)).boxes
         overlaps = iou(frame.boxes_px[0], boxes)
@@ -139,19 +138,12 @@ def _numbers(values):
     return [float(value) if np.isfinite(value) else None for value in values]
 
 
-def table(result):
-    names = [name for name in ('ours', 'thesis', 'recorded') if result[name] is not None]
-    lines = ['%-20s' % '' + ''.join('%12s' % name for name in names)]
-    for key in LENGTHS + SHARES + ('missed',):
-        values = [result[name][key] for name in names]
-        lines.append('%-20s' % key + ''.join('%12s' % ('-' if value is None else '%d' % value if key == 'missed'
-                                                       else '%.4f' % value) for value in values))
-    return lines
-
-
-def main():
-    """Run the command `./run bench accuracy`."""
-    arguments = _arguments()
+def run(arguments):
+    """Compare the estimators on the session."""
+    if not arguments.data:
+        raise ValueError('no --data given, and ROS_3D_BB_DATA is not set')
+    if arguments.boxes == 'yolov5' and not arguments.weights:
+        raise ValueError('--boxes yolov5 needs --weights')
     session = read_session(arguments.data)
     session = session._replace(frames=tuple(annotated_people(session.frames)))
     if not session.frames:
@@ -165,16 +157,15 @@ def main():
     if arguments.fit:
         seen = np.isfinite(ours.raw_m[:, 0])
         write_error_model(arguments.fit, fit_error_model(
-            ours.raw_m[seen], truth_of(session)[seen], source=arguments.source, estimator=arguments.estimator,
-            camera=arguments.camera, date=arguments.date))
-    write_json(arguments.json, result)
-    print('%d frames at %d positions, boxes: %s, estimator: %s, calibration: %s' % (
-        result['frames'], result['positions'], arguments.boxes, arguments.estimator, result['calibration']))
-    print('\n'.join(table(result)))
+            ours.raw_m[seen], truth_of(session)[seen], estimator=arguments.estimator))
+    print(line_of(**{key: value for key, value in result.items() if isinstance(value, (int, str))}))
+    estimators = {name: result[name] for name in ('ours', 'thesis', 'recorded') if result[name] is not None}
+    print('\n'.join(table_of(transposed(estimators))))
+    return result
 
 
-def _arguments():
-    parser = argparse.ArgumentParser(prog='./run bench accuracy', description=__doc__)
+def add_options(parser):
+    """Add the options of the command."""
     parser.add_argument('--data', default=data_folder('thesis'), metavar='DIR',
                         help='a measurement session (default: $ROS_3D_BB_DATA/data/thesis)')
     parser.add_argument('--error-model', metavar='FILE', help='error model for the correction (default: models fitted '
@@ -183,12 +174,3 @@ def _arguments():
     parser.add_argument('--boxes', choices=('recorded', 'yolov5'), default='recorded', help='default: recorded')
     parser.add_argument('--weights', default=default_weights(), help='checkpoint or export, for --boxes yolov5')
     parser.add_argument('--estimator', default='foreground', metavar='NAME', help='default: foreground')
-    parser.add_argument('--json', metavar='FILE', help='also write the scores as JSON')
-    for name in ('source', 'camera', 'date'):
-        parser.add_argument('--' + name, default='', help='stored in the file of --fit')
-    arguments = parser.parse_args()
-    if not arguments.data:
-        parser.error('no --data given, and ROS_3D_BB_DATA is not set')
-    if arguments.boxes == 'yolov5' and not arguments.weights:
-        parser.error('--boxes yolov5 needs --weights')
-    return arguments

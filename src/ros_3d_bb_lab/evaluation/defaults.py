@@ -1,10 +1,8 @@
-"""What benchmarks find on a machine: weights, scenarios, recorded data, its cores and software; and their output."""
+"""What benchmarks find on a machine: weights, scenarios, recorded data, its cores; and the limits of options."""
 import argparse
 import glob
-import json
 import os
 import platform
-import sys
 
 import numpy as np
 
@@ -28,25 +26,40 @@ def scenario_path(name):
         if os.path.isfile(path):
             return path
     raise argparse.ArgumentTypeError('no scenario %r; a file, or one of %s expected'
-                                     % (name, ', '.join(os.path.basename(path)[:-5] for path in scenario_paths('*'))))
+                                     % (name, ', '.join(map(scene_name, scenario_paths('*')))))
 
 
-def scenario_paths(*patterns):
-    """Paths of the scenarios in config/scenarios whose names match a pattern, in the order of the patterns."""
-    return [path for pattern in patterns for path in sorted(glob.glob(os.path.join(SCENARIOS, pattern + '.yaml')))]
+def scenario_paths(pattern):
+    """Paths of the scenarios in config/scenarios whose names match a pattern."""
+    return sorted(glob.glob(os.path.join(SCENARIOS, pattern + '.yaml')))
+
+
+def scene_name(path):
+    """Name of the scenario in a file."""
+    return os.path.splitext(os.path.basename(path))[0]
+
+
+def add_scenarios(parser, *patterns):
+    """Add scenarios to the options of a benchmark; by default those whose names match a pattern."""
+    parser.add_argument('scenarios', nargs='*', type=scenario_path, metavar='SCENARIO',
+                        default=[path for pattern in patterns for path in scenario_paths(pattern)],
+                        help='names in config/scenarios or files (default: %s)' % ', '.join(patterns))
+
+
+def in_range(kind, low, high=float('inf')):
+    """A type for argparse: numbers of a kind, int or float, from `low` to `high`."""
+    def converted(text):
+        value = kind(text)
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError('%s; %g to %g expected' % (text, low, high))
+        return value
+    return converted
 
 
 def data_folder(name):
     """Folder of recorded data by its name in `$ROS_3D_BB_DATA/data`; None if it does not exist."""
     path = os.path.join(os.environ.get('ROS_3D_BB_DATA', ''), 'data', name)
     return path if os.path.isdir(path) else None
-
-
-def write_json(path, result):
-    """Write a result and the command that gave it to a file, if there is a path."""
-    if path:
-        with open(path, 'w') as stream:
-            json.dump(dict(result, command=' '.join(sys.argv)), stream, indent=1)
 
 
 def describe_machine():

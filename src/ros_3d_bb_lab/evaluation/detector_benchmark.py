@@ -5,7 +5,6 @@ other load on the machine affects all of them equally and the ratios of their ti
 from the image to the boxes, with one thread. Scores differ between families of networks, so the confidence with the
 highest F1 score is given for each network.
 """
-import argparse
 import os
 import tempfile
 import time
@@ -17,16 +16,15 @@ from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
-from ros_3d_bb_lab.evaluation.defaults import data_folder, default_weights, describe_machine, write_json
+from ros_3d_bb_lab.evaluation.defaults import data_folder, default_weights, describe_machine, in_range
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
+from ros_3d_bb_lab.evaluation.text_table import table_of
 
 FOUND_IOU = 0.5
 CONFIDENCES = np.arange(5, 100) / 100.0  # among which the best one is searched
 WARM_UPS = 3  # images that are not timed
 DEPTH = 'depth'  # the row of the detector without weights
 SIMULATED = (2.0, 3.0, 4.0), (-0.25, 0.0, 0.25), 1  # arguments of write_simulated_session
-COLUMNS = '%-28s %6s %11s %12s %8s %7s %16s'
-HEADINGS = ('detector', 'found', 'median IoU', 'false boxes', 'CPU ms', 'ratio', 'best confidence')
 
 
 def open_networks(paths, confidence):
@@ -57,25 +55,12 @@ def depth_detector(camera):
 
 
 def compare(session, detectors):
-    """Run detectors on the images of a session that have recorded boxes.
+    """Run detectors on the images of a session that have recorded boxes. Raises ValueError if there are none.
 
-    Parameters
-    ----------
-    session : session_reader.Session
-    detectors : dict
-        Functions of a color image (height, width, 3), RGB, and a DepthImage, by name. They return boxes (n, 4).
-
-    Returns
-    -------
-    dict
-        `frames`, their number; `boxes`, the number of their boxes; and `detectors`, by name: `found` boxes with an IoU
-        of at least 0.5, `median_iou` of all recorded boxes with the best detection (0 without), `false_boxes` without a
-        recorded box, and `cpu_ms`, the median of the CPU times.
-
-    Raises
-    ------
-    ValueError
-        If there is no image with a box.
+    `detectors` are functions, by name, of a color image and a DepthImage that return boxes (n, 4). Returns a
+    dictionary: `frames`, their number; `boxes`, the number of their boxes; and `detectors`, by name: `found` boxes with
+    an IoU of at least 0.5, `median_iou` of all recorded boxes with the best detection (0 without), `false_boxes`
+    without a recorded box, and `cpu_ms`, the median of the CPU times.
     """
     frames = annotated_frames(session)
     overlaps, false_boxes, times_ms = ({name: [] for name in detectors} for _result in range(3))
@@ -136,20 +121,8 @@ def named(paths):
     return {name if names.count(name) == 1 else path: path for name, path in zip(names, paths)}
 
 
-def table(result):
-    """Format the results as lines of text. The ratio of CPU times is that to the first detector."""
-    rows = result['detectors']
-    first_ms = next(iter(rows.values()))['cpu_ms']
-    return [COLUMNS % HEADINGS] + [
-        COLUMNS % (name, row['found'], '%.3f' % row['median_iou'], row['false_boxes'], '%.1f' % row['cpu_ms'],
-                   '%.2f' % (row['cpu_ms'] / first_ms),
-                   '%.2f (F1 %.3f)' % (row['best_confidence'], row['best_f1']) if 'best_f1' in row else '-')
-        for name, row in rows.items()]
-
-
-def main():
-    """Run the command `./run bench detector`."""
-    arguments = _arguments()
+def run(arguments):
+    """Compare the detectors on the session."""
     cv2.setNumThreads(1)
     with tempfile.TemporaryDirectory() as folder:
         session = read_session(arguments.data or write_simulated_session(folder, *SIMULATED))
@@ -158,27 +131,24 @@ def main():
         detectors = {name: boxes_of(network) for name, network in networks.items()}
         detectors[DEPTH] = depth_detector(session.camera)
         result = dict(compare(session, detectors), machine=describe_machine())
+        rows = result['detectors']
         for name, network in networks.items():
-            row = result['detectors'][name]
-            row['best_confidence'], row['best_f1'] = best_confidence(session, network)
-    write_json(arguments.json, result)
+            rows[name]['best_confidence'], rows[name]['best_f1'] = best_confidence(session, network)
+        first_ms = next(iter(rows.values()))['cpu_ms']
+        for row in rows.values():
+            row['ratio'] = row['cpu_ms'] / first_ms
     print('%s\n%d images, %d people' % (result['machine'], result['frames'], result['boxes']))
-    print('\n'.join(table(result)))
+    print('\n'.join(table_of(rows)))
+    return result
 
 
-def _arguments():
-    parser = argparse.ArgumentParser(prog='./run bench detector', description=__doc__)
+def add_options(parser):
+    """Add the options of the command."""
     parser.add_argument('--weights', nargs='+', default=list(filter(None, [default_weights()])), metavar='FILE',
                         help='model files: YOLOv5 checkpoints, ONNX files (default: yolov5n.pt in the cache, if any)')
     parser.add_argument('--data', default=data_folder('thesis'), metavar='DIR',
                         help='measurement session (default: $ROS_3D_BB_DATA/data/thesis, or simulated)')
-    parser.add_argument('--every', type=int, default=1, metavar='N', help='use every Nth image (default: 1)')
-    parser.add_argument('--confidence', type=float, default=DetectionParams().confidence, metavar='P',
+    parser.add_argument('--every', type=in_range(int, 1), default=1, metavar='N',
+                        help='use every Nth image (default: 1)')
+    parser.add_argument('--confidence', type=in_range(float, 0, 1), default=DetectionParams().confidence, metavar='P',
                         help='smallest score of a detection of a network (default: %(default)s)')
-    parser.add_argument('--json', metavar='FILE', help='also write the results to FILE')
-    arguments = parser.parse_args()
-    if arguments.every < 1:
-        parser.error('--every is %d; at least 1 expected' % arguments.every)
-    if not 0 <= arguments.confidence <= 1:
-        parser.error('--confidence is %g; 0 to 1 expected' % arguments.confidence)
-    return arguments

@@ -2,8 +2,7 @@
 import base64
 import html
 import mimetypes
-
-from ros_3d_bb_lab.evaluation.report_blocks import Figure, Heading, Paragraph
+from typing import NamedTuple, Tuple
 
 PAGE = '''<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8">
@@ -21,6 +20,29 @@ figcaption, .caption {{ color: #444; font-size: 0.9em; margin: 0.5em 0 0; }}
 {body}
 </body></html>
 '''
+
+
+class Heading(NamedTuple):
+    text: str
+
+
+class Paragraph(NamedTuple):
+    text: str
+
+
+class Table(NamedTuple):
+    """Table of text. The caption is above it."""
+
+    caption: str
+    header: Tuple[str, ...]
+    rows: Tuple[Tuple[str, ...], ...]
+
+
+class Figure(NamedTuple):
+    """PNG file in the folder of the report, and its caption."""
+
+    name: str
+    caption: str
 
 
 def html_report(title, blocks, folder):
@@ -45,3 +67,13 @@ def _rendered(block, folder):
 
 def _row(cell, texts):
     return '<tr>%s</tr>' % ''.join('<%s>%s</%s>' % (cell, html.escape(text), cell) for text in texts)
+
+
+def numbered(blocks):
+    """Number the captions of figures and tables."""
+    counts = {Figure: 0, Table: 0}
+    for block in blocks:
+        if type(block) in counts:
+            counts[type(block)] += 1
+            block = block._replace(caption='%s %d: %s' % (type(block).__name__, counts[type(block)], block.caption))
+        yield block

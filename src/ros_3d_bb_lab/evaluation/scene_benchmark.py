@@ -1,7 +1,4 @@
 """Benchmark of the pipeline on simulated scenes with different detectors, against ground truth."""
-import argparse
-import os
-
 import numpy as np
 
 from ros_3d_bb.camera.depth_image import DepthImage
@@ -12,20 +9,17 @@ from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb_lab.evaluation.clear_mot import ClearMatcher, score
-from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_path, scenario_paths, write_json
+from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, add_scenarios, scene_name
 from ros_3d_bb_lab.evaluation.scenes import run_scene, score_detections
+from ros_3d_bb_lab.evaluation.text_table import line_of
 from ros_3d_bb_lab.simulation.scenario import read_scenario
-from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
-from ros_3d_bb_lab.simulation.true_boxes import is_in_image, jittered_boxes
+from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator, is_in_image, jittered_boxes
 
 RANGE_M = {'yolov5': (2.0, 8.0), 'depth': (2.0, 6.0), 'exact': (0.5, 8.0)}  # evaluated range of each detector
 EVERY = {'yolov5': 2, 'depth': 2, 'exact': 1}  # every n-th image is used
 NEAREST_M = 0.5  # minimum distance from the camera in the plane
 HELD_M = 0.5  # maximum distance between a person and a matching track
 ROUNDING_M = 1e-6
-COLUMNS = '%-20s %-8s %6s %6s %6s %8s %7s %7s %4s %11s %9s %9s'
-HEADINGS = ('scene', 'detector', 'images', 'recall', 'false', 'switches', 'RMSE', 'worst', 'IDs', 'not visible',
-            'velocity', '1 s ahead')
 
 
 def depth_detector(simulator):
@@ -37,9 +31,8 @@ def depth_detector(simulator):
 
 def yolov5_detector(weights):
     """YOLOv5 detector for `run_scene` from a checkpoint. Raises ValueError if the checkpoint cannot be used."""
-    from ros_3d_bb.detection.network_detector import NetworkDetector
-    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime  # may import torch (slow)
-    detector = NetworkDetector(open_runtime(weights, RuntimeParams(device='cpu')))
+    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_detector  # may import torch (slow)
+    detector = open_detector(weights, running=RuntimeParams(device='cpu'))
     return lambda frame: detector.detect(frame.color)
 
 
@@ -125,42 +118,28 @@ def result_of(steps, detector, camera=D435I_COLOR):
     return result
 
 
-def main():
-    """Run the command `./run bench scenes`."""
-    arguments = _parser().parse_args()
+def run(arguments):
+    """Run the scenarios with each detector."""
     yolov5, results = yolov5_detector(arguments.weights) if arguments.weights else None, []
-    print(COLUMNS % HEADINGS)
     for path in arguments.scenarios:
         results += _run(path, yolov5)
-    write_json(arguments.json, {'scenes': results})
+    return {'scenes': results}
 
 
-def _parser():
-    parser = argparse.ArgumentParser(prog='./run bench scenes', description=__doc__)
-    parser.add_argument('scenarios', nargs='*', type=scenario_path, metavar='SCENARIO',
-                        default=scenario_paths('thesis_*', 'approach_*'),
-                        help='names in config/scenarios or files (default: thesis_*, approach_*)')
+def add_options(parser):
+    """Add the options of the command."""
+    add_scenarios(parser, 'thesis_*', 'approach_*')
     parser.add_argument('--weights', help='checkpoint or export of YOLOv5; without it, YOLOv5 is not run')
-    parser.add_argument('--json', metavar='FILE', help='also write the scores to FILE')
-    return parser
 
 
 def _run(path, yolov5):
     """Run one scene with each detector and print the results. The error model applies only to the boxes of `exact`."""
-    name, simulator, results = os.path.basename(path).replace('.yaml', ''), Simulator(read_scenario(path)), []
+    name, simulator, results = scene_name(path), Simulator(read_scenario(path)), []
     for detector, detect, model in (('depth', depth_detector(simulator), None), ('yolov5', yolov5, None),
                                     ('exact', exact_detector(simulator), read_error_model(SIMULATED_ERROR_MODEL))):
         if detect is not None:
             steps = run_scene(simulator, detect, EVERY[detector], error_model=model)
-            results.append(dict(result_of(steps, detector, simulator.camera), scene=name))
-            _print_row(results[-1])
+            result = result_of(steps, detector, simulator.camera)
+            print(line_of(name, **result), flush=True)
+            results.append(dict(result, scene=name))
     return results
-
-
-def _print_row(result):
-    texts = {key: '-' if result[key] is None else '%.3f %s' % (result[key], 'm/s' if key.endswith('mps') else 'm')
-             for key in ('rmse_m', 'worst_m', 'velocity_rmse_mps', 'prediction_1s_m')}
-    print(COLUMNS % (result['scene'], result['detector'], result['images'], '%.3f' % result['recall'],
-                     '%.3f' % result['false_boxes'], result['id_switches'], texts['rmse_m'], texts['worst_m'],
-                     result['track_ids'], result['not_visible'], texts['velocity_rmse_mps'],
-                     texts['prediction_1s_m']), flush=True)

@@ -5,7 +5,6 @@ computes 3D boxes in the camera's frame; tracking transforms them to the fixed f
 people of a measurement session are placed side by side in one wide depth image. Both algorithms process the same image
 and boxes alternately, so that other load on the machine affects both equally and their ratio remains valid.
 """
-import argparse
 import functools
 import itertools
 import tempfile
@@ -17,6 +16,7 @@ import numpy as np
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from, transform_points
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.estimation.box3d import ImageGeometry, plausible
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimate_median, estimator_named, sample_depth
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
@@ -24,8 +24,9 @@ from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import CameraView, Detection, detections_from_boxes
 from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker
-from ros_3d_bb_lab.evaluation.defaults import data_folder, default_weights, describe_machine, write_json
+from ros_3d_bb_lab.evaluation.defaults import data_folder, default_weights, describe_machine, in_range
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
+from ros_3d_bb_lab.evaluation.text_table import line_of, table_of
 
 OBJECTS = (1, 2, 5, 10, 20, 50, 100)
 WARM_UPS = 10  # images that are not timed, until tracks are confirmed and caches are warm
@@ -127,27 +128,24 @@ class Theirs(object):
                 for track in self._tracker.step(stamp_ns, detections)}
 
 
-def speed(session, counts=OBJECTS, images=60, seed=0):
+def speed(session, counts=OBJECTS, images=60):
     """Measure the CPU time of both algorithms in `images` images for each number of people in `counts`.
 
-    `seed` is that of the order of the people and of the jitter. Returns a dictionary: `machine`, `people`, `images`,
-    `objects` (= `counts`); for `ours` and `thesis` the median, mean and standard deviation of the times in ms by stage;
-    and medians by number of people: `ratio` of our time to that of the thesis over both stages, and `growth` of our
-    time relative to that for 5 people, or for the fewest without 5 in `counts`. Raises ValueError if no frame of the
-    session has a box.
+    Returns a dictionary: `machine`, `people`, `images`, `objects` (= `counts`); for `ours` and `thesis` the medians of
+    the times in ms by stage; and `ratio`, the median ratio of our time to that of the thesis over both stages. Raises
+    ValueError if no frame of the session has a box.
     """
-    people, random = people_of(session), np.random.RandomState(seed)
+    people, random = people_of(session), np.random.RandomState(0)
     if not people:
         raise ValueError('no frame of the session has a 2D box')
     random.shuffle(people)  # sessions are ordered by range
     times_ms = _times_ms([crowd_of(people, count, session) for count in counts], images, random)
     result = {'machine': describe_machine(), 'people': len(people), 'images': images, 'objects': list(counts)}
     for number, name in enumerate(ALGORITHMS):
-        result[name] = _statistics(times_ms[:, :, number])
+        medians_ms = np.median(times_ms[:, :, number], axis=0).T.tolist()
+        result[name] = dict(zip([stage + '_ms' for stage in STAGES], medians_ms))
     both_ms = times_ms[..., STAGES.index('both')]
-    few = list(counts).index(5) if 5 in counts else int(np.argmin(counts))
     result['ratio'] = np.median(both_ms[:, :, 0] / both_ms[:, :, 1], axis=0).tolist()
-    result['growth'] = np.median(both_ms[:, :, 0] / both_ms[:, few:few + 1, 0], axis=0).tolist()
     return result
 
 
@@ -172,15 +170,6 @@ def _time_ms(algorithm, depth, rects_px, stamp_ns):
     return 1e3 * (between_s - start_s), 1e3 * (end_s - between_s), 1e3 * (end_s - start_s)
 
 
-def _statistics(times_ms):
-    """Median, mean and standard deviation of times (images, counts, stages), by stage."""
-    result = {}
-    for number, stage in enumerate(STAGES):
-        for suffix, statistic in (('_ms', np.median), ('_mean_ms', np.mean), ('_sd_ms', np.std)):
-            result[stage + suffix] = statistic(times_ms[..., number], axis=0).tolist()
-    return result
-
-
 def detector_speed(images, weights, runtimes=('torch', 'onnxruntime'), sizes=(640, 512)):
     """Measure the time of detection on the CPU, from the image to the boxes.
 
@@ -203,10 +192,9 @@ def detector_speed(images, weights, runtimes=('torch', 'onnxruntime'), sizes=(64
 
 
 def _detector(weights, runtime, size):
-    from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetector
-    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime
+    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_detector
     running = RuntimeParams(runtime=runtime, device='cpu', threads=1)
-    return NetworkDetector(open_runtime(weights, running), DetectionParams(image_size=size))
+    return open_detector(weights, DetectionParams(image_size=size), running)
 
 
 def _detector_time_ms(detector, image):
@@ -215,49 +203,28 @@ def _detector_time_ms(detector, image):
     return (time.process_time() - cpu_s) * 1e3, (time.perf_counter() - wall_s) * 1e3
 
 
-def table(result):
-    """Format the times as lines of text."""
-    lines = ['CPU time of an image, ms: median (mean ± standard deviation)',
-             '%-20s' % 'people' + ''.join('%22d' % count for count in result['objects'])]
-    for name in ALGORITHMS:
-        for stage in STAGES:
-            columns = zip(*(result[name][stage + suffix] for suffix in ('_ms', '_mean_ms', '_sd_ms')))
-            lines.append('%-20s' % ('%s, %s' % (name, stage)) + ''.join(
-                '%22s' % ('%.2f (%.2f ± %.2f)' % column) for column in columns))
-    for key, title in (('ratio', 'ours / thesis'), ('growth', 'ours / ours for few')):
-        lines.append('%-20s' % title + ''.join('%22.2f' % value for value in result[key]))
-    lines += ['detector, %s at %d: %.1f ms CPU time, %.1f ms wall time'
-              % (row['runtime'], row['size'], row['cpu_ms'], row['wall_ms']) for row in result['detector']]
-    return lines
-
-
-def main():
-    """Run the command `./run bench speed`."""
-    arguments = _arguments()
+def run(arguments):
+    """Measure the times, and those of the detector if there are weights."""
     with tempfile.TemporaryDirectory() as folder:
         session = read_session(arguments.data or write_simulated_session(folder, *SIMULATED))
-        result = speed(session, OBJECTS, arguments.images, arguments.seed)
+        result = speed(session, OBJECTS, arguments.images)
         colors = [read_color(frame, session.camera) for frame in session.frames[:DETECTOR_IMAGES]]
     result['data'] = arguments.data or 'simulated'
     result['detector'] = detector_speed(colors, arguments.weights) if arguments.weights else []
-    write_json(arguments.json, result)
-    print('%s\n%d people of %s, %d images each' % (
-        result['machine'], result['people'], 'the session ' + arguments.data if arguments.data else
-        'a simulated session (no --data, and ROS_3D_BB_DATA is not set)', result['images']))
-    print('\n'.join(table(result)))
+    print(line_of(**{key: result[key] for key in ('machine', 'people', 'data', 'images')}))
+    rows = {'%s/%s' % (name, key): values for name in ALGORITHMS for key, values in result[name].items()}
+    rows['ratio'] = result['ratio']
+    print('\n'.join(table_of({name: dict(zip(result['objects'], values)) for name, values in rows.items()})))
+    for row in result['detector']:
+        print(line_of(**row))
+    return result
 
 
-def _arguments():
-    parser = argparse.ArgumentParser(prog='./run bench speed', description=__doc__)
+def add_options(parser):
+    """Add the options of the command."""
     parser.add_argument('--data', default=data_folder('thesis'), metavar='DIR',
                         help='measurement session (default: $ROS_3D_BB_DATA/data/thesis, or simulated)')
     parser.add_argument('--weights', default=default_weights(), metavar='FILE',
                         help='YOLOv5 checkpoint; also measures the detector')
-    parser.add_argument('--images', type=int, default=60, help='timed images per number of people (default: 60)')
-    parser.add_argument('--seed', type=int, default=0,
-                        help='seed of the order of the people and the jitter of their boxes (default: 0)')
-    parser.add_argument('--json', metavar='FILE', help='also write the times to FILE')
-    arguments = parser.parse_args()
-    if arguments.images < 1:
-        parser.error('--images is %d; at least 1 expected' % arguments.images)
-    return arguments
+    parser.add_argument('--images', type=in_range(int, 1), default=60,
+                        help='timed images per number of people (default: 60)')

@@ -1,4 +1,1 @@
-"""A simulated room with walking people, seen by a RealSense D435i on a Jackal; free of ROS.
-
-May import: camera, core, tracking.
-"""
+"""A simulated room with walking people, seen by a RealSense D435i on a Jackal; free of ROS."""

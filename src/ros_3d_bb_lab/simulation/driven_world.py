@@ -1,14 +1,13 @@
 """World of a scenario with a robot that obeys velocity commands, and people who may give way to it.
 
-Convention: map frame, metres, radians, seconds. The states depend only on the scenario, the times at which they are
-requested, and the commands between them.
+Convention: map frame, metres, radians, seconds; poses are (x, y, heading), velocities (linear, angular). The states
+depend only on the scenario, the times at which they are requested, and the commands between them.
 """
 from typing import NamedTuple
 
 import numpy as np
 
 from ros_3d_bb_lab.simulation.collision import Rectangle, nearest_wall_points
-from ros_3d_bb_lab.simulation.driving import limited_velocity, measured_velocity, moved
 from ros_3d_bb_lab.simulation.gait import Posture, stride_m
 from ros_3d_bb_lab.simulation.motion import WALKING_MPS, State, wrapped
 from ros_3d_bb_lab.simulation.social_force import RELAXATION_S, next_velocity, social_force
@@ -29,6 +28,21 @@ class Collision(NamedTuple):
     time_s: float
     object: str       # 'person 1', 'furniture 1' or 'a wall'; numbers as in the scenario
     speed_mps: float  # of the robot
+
+
+def limited_velocity(velocity, wanted, drive, step_s):
+    """Velocity (2,) after a time step towards the wanted one, within the limits of a `scenario.Drive`."""
+    fastest = np.array([drive.speed, drive.rate])
+    change = np.array([drive.acceleration, drive.angular_acceleration]) * step_s
+    return velocity + np.clip(np.clip(wanted, -fastest, fastest) - velocity, -change, change)
+
+
+def moved(pose, velocity, step_s):
+    """Pose (3,) after a time step at constant velocity, which is an arc of a circle."""
+    turn = velocity[1] * step_s
+    chord_m = velocity[0] * step_s * np.sinc(turn / 2 / np.pi)
+    heading = pose[2] + turn / 2
+    return pose + np.array([chord_m * np.cos(heading), chord_m * np.sin(heading), turn])
 
 
 class DrivenWorld(object):
@@ -97,7 +111,7 @@ class DrivenWorld(object):
         if self._is_blocked(pose, float(abs(velocity[0]))):
             pose, velocity = self._pose, np.zeros(2)
         self._pose, self._velocity = pose, velocity
-        self.odometry_velocity = measured_velocity(velocity, self._robot.drive.odometry_error)
+        self.odometry_velocity = velocity * (1 + np.array(self._robot.drive.odometry_error))
         self._odometry = moved(self._odometry, self.odometry_velocity, step_s)
 
     def _is_blocked(self, pose, speed_mps):

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_3d_bb_lab.simulation.mesh import Mesh, box
+from ros_3d_bb_lab.simulation.mesh import Mesh, box, merged
 from ros_3d_bb_lab.simulation.motion import State
 
 GAP_M = 0.4  # from the axis of a person to the object in front of them
@@ -43,10 +43,10 @@ def object_mesh(scene_object, random):
     parts = one_box or SHAPES[scene_object.label]
     color = scene_object.color or COLORS.get(scene_object.label, OTHER_COLOR)
     meshes = [box(part.size_m, color, random).moved(part.at_m, 0) for part in parts]
-    offsets = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
-    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate([mesh.normals for mesh in meshes]),
-                np.concatenate([mesh.faces + offset for mesh, offset in zip(meshes, offsets)]),
-                np.concatenate([mesh.colors for mesh in meshes]), np.concatenate([mesh.tone for mesh in meshes]))
+    vertices, faces = merged([(mesh.vertices, mesh.faces) for mesh in meshes])
+    normals, colors, tone = (np.concatenate([getattr(mesh, name) for mesh in meshes])
+                             for name in ('normals', 'colors', 'tone'))
+    return Mesh(vertices, normals, faces, colors, tone)
 
 
 class PushedMotion(object):

@@ -4,7 +4,7 @@ from typing import List, NamedTuple, Optional, Tuple
 import cv2
 import numpy as np
 
-from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
+from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from, transform_points
 from ros_3d_bb.core.labels import PERSON
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject, prediction_times_s
@@ -20,6 +20,8 @@ D435I_COLOR = Camera(640, 480, 614.686, 614.842, 319.199, 242.08)  # camera of t
 FRONT_FROM_OPTICAL = transform_from((0, 0, 0), OPTICAL_ROTATION)
 SHADOW_RADIUS_M = 0.28
 STEP_S = 0.02  # maximum time between two states of the robot in ROS, as in the odometry of a Jackal
+LEAST_SHOWN = 0.3  # visible share of the body below which its position cannot be estimated
+JITTER_PX = 1.0  # standard deviation of the edges of boxes, as of a very good detector
 MIN_VISIBLE = 0.25  # minimum share of the body in the image of a person with the status VISIBLE
 MOVING_MPS = 0.05
 PREDICTION_S, PREDICTION_STEP_S = 2.0, 0.25
@@ -239,3 +241,24 @@ def _build(person, seed, number):
                   SHIRTS[shirts[number % len(SHIRTS)]], choice(TROUSERS), choice(SHOES))
     specified = dict(person._asdict(), height_m=person.height)
     return build._replace(**{name: specified[name] for name in Build._fields if specified.get(name) is not None})
+
+
+def jittered_boxes(frame, camera, seed):
+    """True boxes (n, 4) of the people in a SimulatedFrame, with edges jittered by `JITTER_PX`.
+
+    They are those of people with `is_in_image`, or with at least `LEAST_SHOWN` of the body visible.
+    """
+    random = np.random.RandomState([seed, frame.number])
+    jitter_px = np.rint(random.normal(0, JITTER_PX, (len(frame.people), 4)))
+    shown = [person.visible >= LEAST_SHOWN or is_in_image(person, frame.poses.map_from_camera, camera)
+             for person in frame.people]
+    boxes = [person.box_px + jitter for person, jitter, is_shown in zip(frame.people, jitter_px, shown) if is_shown]
+    return np.clip(np.reshape(boxes, (-1, 4)), 0, [camera.width, camera.height] * 2)
+
+
+def is_in_image(person, map_from_camera, camera):
+    """Whether the body axis of a PersonTruth is between the left and right image borders, and not mostly occluded."""
+    x_m, _y, z_m = transform_points(np.linalg.inv(map_from_camera), person.position_m)
+    if person.box_px is None or person.hidden > 1 - LEAST_SHOWN or z_m <= 0:
+        return False
+    return bool(0 <= camera.fx * x_m / z_m + camera.cx < camera.width)

@@ -12,13 +12,14 @@ from ros_3d_bb.detection.boxes import Detections
 from ros_3d_bb.detection.depth.ground_plane import FittedFloor, check_upright
 from ros_3d_bb.detection.depth.person_classifier import (BEST_HOG, PersonHog, PersonWindow, person_score, pyramid_of,
                                                          shape_features_of)
-from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams, find_person_clusters, grid_of, is_standing, quantile_of
+from ros_3d_bb.detection.depth.person_clusters import (DepthPeopleParams, find_person_clusters, grid_of, is_standing,
+                                                       quantile_of)
 
 MEAN_HEIGHT_M, MEAN_WIDTH_M = 1.7, 0.5  # assumed for people who are partly outside the image
 SURE_SCORE = 0.95  # no further HOG scores are evaluated from this score on
 MAX_HOG_AGE = 2  # number of further images for which the HOG score of a person is used
-# A person who was sure in an image continues with a lower score, as one who crouches, for this many images, of which one
-# without the person counts as several; chosen: furniture has lower scores, and 75 images are 5 s of the demo.
+# A person who was sure in an image continues with a lower score, as one who crouches, for so many images, of which one
+# without the person counts as several. Chosen: furniture has lower scores, and 75 images are 5 s of the demo.
 CONTINUED_SCORE, MAX_UNSURE, NOT_FOUND = 0.1, 75, 15
 NEARER_M, HIDDEN_SHARE = 0.3, 0.5  # of a person who hides the legs of another one, and of the width of these; chosen
 MIN_DISTANCE_M = 0.35  # between the centres of two people; closer detections are one person

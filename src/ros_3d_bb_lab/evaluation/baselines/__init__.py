@@ -1,4 +1,1 @@
-"""Baselines for comparison: the thesis' algorithms, Norfair, and an oracle.
-
-May import: camera, core, tracking.
-"""
+"""Baselines for comparison: the thesis' algorithms, Norfair, and an oracle."""

@@ -3,7 +3,6 @@
 Scenes are rendered and tracked first. Then their tracks and transforms are played on simulated time to
 planner_bridge_node and a costmap_2d_node with the people layer of config/move_base/local_costmap.yaml.
 """
-import argparse
 import contextlib
 import os
 import sys
@@ -26,10 +25,11 @@ from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb_lab.evaluation.costmap.costmap_score import Costmap, Sighting, score_costmaps
-from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, describe_machine, scenario_path, write_json
+from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, add_scenarios, describe_machine, scene_name
 from ros_3d_bb_lab.evaluation.launching import free_port, running_roslaunch
 from ros_3d_bb_lab.evaluation.scene_benchmark import RANGE_M, depth_detector, yolov5_detector
 from ros_3d_bb_lab.evaluation.scenes import run_scene
+from ros_3d_bb_lab.evaluation.text_table import line_of
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import BASE_FRAME, MAP_FRAME, ODOM_FRAME
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import Simulator
@@ -40,8 +40,6 @@ TICK_S, ODOM_S, LOCALISATION_S = 0.01, 0.02, 0.1  # periods of /clock, of odom i
 GAP_NS, LEAD_S = 100 * NS, 0.5  # between scenes, and of tf before the first image
 STARTING_S = 30.0
 COSTMAP_S, PATIENCE_S = 0.4, 1.0  # longest time between costmaps, and how long to wait for one in real time
-COLUMNS = '%-20s %8s %7s %8s %12s %6s %10s'
-HEADINGS = 'scene', 'costmaps', 'people', 'recall', 'false cells', 'trails', 'trail p95'
 LAUNCH = """<launch>
   <param name="/use_sim_time" value="true"/>
   <include file="$(find ros_3d_bb)/launch/planner_bridge.launch"/>
@@ -65,11 +63,11 @@ class Scene(NamedTuple):
     range_m: Tuple[float, float]
 
 
-def tracked_scene(name, path, yolov5=None):
+def tracked_scene(path, yolov5=None):
     """Render and track the scenario in a file with the depth detector or the one given."""
     simulator = Simulator(read_scenario(path))
     steps = run_scene(simulator, yolov5 or depth_detector(simulator), 1, read_error_model(SIMULATED_ERROR_MODEL))
-    return Scene(name, simulator, steps, RANGE_M['yolov5' if yolov5 else 'depth'])
+    return Scene(scene_name(path), simulator, steps, RANGE_M['yolov5' if yolov5 else 'depth'])
 
 
 def sightings_of(scene):
@@ -91,8 +89,8 @@ class Player(object):
     Attribute `start_ns`: stamp of the first image of the last scene.
     """
 
-    def __init__(self, speed):
-        self._speed, self._now_ns, self._grids, self.start_ns = speed, START_NS, [], START_NS
+    def __init__(self):
+        self._now_ns, self._grids, self.start_ns = START_NS, [], START_NS
         self._clock_pub = rospy.Publisher('/clock', Clock, queue_size=100)
         self._tf_pub = rospy.Publisher('/tf', TFMessage, queue_size=100)
         self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=100)
@@ -143,7 +141,7 @@ class Player(object):
         if links:
             self._tf_pub.publish(TFMessage(transform_messages(stamp, links)))
         self._now_ns += int(TICK_S * NS)
-        time.sleep(TICK_S / self._speed)
+        time.sleep(TICK_S)
         deadline_s = time.monotonic() + PATIENCE_S
         while self._is_late() and time.monotonic() < deadline_s:  # the machine is busy
             time.sleep(0.002)
@@ -165,29 +163,20 @@ def result_of(scene, costmaps):
     return score_costmaps(costmaps, sightings_of(scene), scene.simulator.positions_at)
 
 
-def row(name, result):
-    """Format a result as a line of the table."""
-    shares = ['-' if result[key] is None else '%.1f %%' % (100 * result[key]) for key in ('recall', 'false_cells')]
-    trail = '-' if result['trail_p95_s'] is None else '%.2f s' % result['trail_p95_s']
-    return COLUMNS % (name, result['costmaps'], result['people'], shares[0], shares[1], result['trails'], trail)
-
-
-def main():
-    """Run the command `./run bench costmap`."""
-    arguments = _arguments()
-    print(describe_machine())
-    print(COLUMNS % HEADINGS, flush=True)
+def run(arguments):
+    """Score the costmaps of each scene."""
+    print(describe_machine(), flush=True)
     yolov5 = yolov5_detector(arguments.weights) if arguments.weights else None
-    scenes = [tracked_scene(name, path, yolov5) for name, path in arguments.scenes.items()]
+    scenes = [tracked_scene(path, yolov5) for path in arguments.scenarios]
     results = {}
     with running_nodes():
         rospy.init_node('costmap_benchmark', disable_signals=True)
-        player = Player(arguments.speed)
+        player = Player()
         player.start(scenes[0])
         for scene in scenes:
             results[scene.name] = result_of(scene, player.play(scene))
-            print(row(scene.name, results[scene.name]), flush=True)
-    write_json(arguments.json, {'machine': describe_machine(), 'scenes': results})
+            print(line_of(scene.name, **results[scene.name]), flush=True)
+    return {'machine': describe_machine(), 'scenes': results}
 
 
 @contextlib.contextmanager
@@ -202,17 +191,7 @@ def running_nodes(launch=LAUNCH):
             yield
 
 
-def _arguments():
-    parser = argparse.ArgumentParser(prog='./run bench costmap', description=__doc__)
-    parser.add_argument('--scenes', type=scenario_paths, default=','.join(SCENES), metavar='A,B',
-                        help='names in config/scenarios or files, separated by commas (default: %(default)s)')
+def add_options(parser):
+    """Add the options of the command."""
     parser.add_argument('--weights', help='checkpoint or export of YOLOv5; without it, people are detected in depth')
-    parser.add_argument('--speed', type=float, default=1.0,
-                        help='speed of time; less than 1 on a busy machine (default: 1)')
-    parser.add_argument('--json', metavar='FILE', help='file to which the results are also written')
-    return parser.parse_args()
-
-
-def scenario_paths(names):
-    """{name: path} of scenarios that are separated by commas."""
-    return {name: scenario_path(name) for name in names.split(',')}
+    add_scenarios(parser, *SCENES)

@@ -53,24 +53,13 @@ class Sighting(NamedTuple):
 
 
 def score_costmaps(costmaps, sightings, positions_at):
-    """Score the costmaps of a scene.
+    """Score the costmaps of a scene. `positions_at` is a function that returns true positions (n, 2) at a time.
 
-    Parameters
-    ----------
-    costmaps : list of Costmap
-        In the order of time.
-    sightings : list of Sighting
-        In the order of time. A person counts `SETTLED_S` after a track was within `TRACKED_M`, until the next image in
-        which the person is not visible.
-    positions_at : callable
-        True positions (n, 2) of the people at a time.
-
-    Returns
-    -------
-    dict
-        `recall`, the share of tracked people whose centre is lethal; `false_cells`, the share of lethal cells more than
-        `NEAR_M` from any person now and in the next `AHEAD_S`; `trail_p95_s`, how long places stay lethal after a
-        walking person has left them; and the numbers that they are shares of. None where nothing was counted.
+    A person counts `SETTLED_S` after a track was within `TRACKED_M`, until the next image in which the person is not
+    visible. Returns a dictionary: `recall`, the share of tracked people whose centre is lethal; `false_cells`, the
+    share of lethal cells more than `NEAR_M` from any person now and in the next `AHEAD_S`; `trail_p95_s`, how long
+    places stay lethal after a walking person has left them; and the numbers that they are shares of. None where nothing
+    was counted.
     """
     hits = _hits(costmaps, _counted(sightings, positions_at), positions_at)
     false = [_is_false(costmap, positions_at) for costmap in costmaps]

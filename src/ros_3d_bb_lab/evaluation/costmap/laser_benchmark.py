@@ -2,8 +2,6 @@
 
 The laser is that of `simulation.laser`. Scenes are tracked and played as in `benchmark`.
 """
-import argparse
-
 import numpy as np
 import rospy
 from nav_msgs.msg import OccupancyGrid
@@ -11,16 +9,15 @@ from sensor_msgs.msg import LaserScan
 
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb_lab.evaluation.costmap.benchmark import SCENES, Player, running_nodes, scenario_paths, tracked_scene
-from ros_3d_bb_lab.evaluation.defaults import describe_machine, write_json
+from ros_3d_bb_lab.evaluation.costmap.benchmark import SCENES, Player, running_nodes, tracked_scene
+from ros_3d_bb_lab.evaluation.defaults import add_scenarios, describe_machine
+from ros_3d_bb_lab.evaluation.text_table import line_of
 from ros_3d_bb_lab.simulation.laser import FIELD_OF_VIEW, planar_pose, rectangles_of, scan_ranges
 from ros_3d_bb_lab.simulation.ros.driven_robot import scan_to_msg
 
 SCAN_S = 0.05
 CLEARING_BEAMS = 1500  # through each cell
 NEAR_M = 0.2  # cells at most this far from walls and furniture are those of the room
-COLUMNS = '%-20s %9s %15s %15s %13s %13s'
-HEADINGS = 'scene', 'costmaps', 'of people: scan', 'scan_static', 'of the room', 'scan_static'
 LAUNCH = """<launch>
   <param name="/use_sim_time" value="true"/>
   <include file="$(find ros_3d_bb)/launch/people_removal.launch">
@@ -58,8 +55,8 @@ class LaserPlayer(Player):
     Attribute `with_people`: the OccupancyGrids of the layer of the scan with people.
     """
 
-    def __init__(self, speed):
-        super(LaserPlayer, self).__init__(speed)
+    def __init__(self):
+        super(LaserPlayer, self).__init__()
         self._scan_pub, self.with_people = rospy.Publisher('scan', LaserScan, queue_size=10), []
         self._due_ns, self._is_clearing = 0, False
         rospy.Subscriber('/costmap_with_people/costmap/costmap', OccupancyGrid, self.with_people.append,
@@ -96,29 +93,24 @@ def result_of(scene, costmaps, with_people):
             'of_room': means[0][1], 'of_room_static': means[1][1]}
 
 
-def main():
-    """Run the command `./run bench laser`."""
-    parser = argparse.ArgumentParser(prog='./run bench laser', description=__doc__)
-    parser.add_argument('--scenes', type=scenario_paths, default=','.join(SCENES), metavar='A,B',
-                        help='names in config/scenarios or files, separated by commas (default: %(default)s)')
-    parser.add_argument('--speed', type=float, default=1.0,
-                        help='speed of time; less than 1 on a busy machine (default: 1)')
-    parser.add_argument('--json', metavar='FILE', help='file to which the results are also written')
-    arguments = parser.parse_args()
-    print(describe_machine())
-    print(COLUMNS % HEADINGS, flush=True)
-    scenes = [tracked_scene(name, path) for name, path in arguments.scenes.items()]
+def run(arguments):
+    """Count the cells in the costmaps of each scene."""
+    print(describe_machine(), flush=True)
+    scenes = [tracked_scene(path) for path in arguments.scenarios]
     results = {}
     with running_nodes(LAUNCH % ''.join(COSTMAP % item for item in NODES.items())):
         rospy.init_node('laser_benchmark', disable_signals=True)
-        player = LaserPlayer(arguments.speed)
+        player = LaserPlayer()
         player.start(scenes[0])
         for scene in scenes:
             del player.with_people[:]
             costmaps = player.play(scene)
             with_people = player.costmaps_of(scene, player.with_people)
-            result = results[scene.name] = result_of(scene, costmaps, with_people)
-            print(COLUMNS % (scene.name, result['costmaps'], '%.1f' % result['of_people'],
-                             '%.1f' % result['of_people_static'], '%.0f' % result['of_room'],
-                             '%.0f' % result['of_room_static']), flush=True)
-    write_json(arguments.json, {'machine': describe_machine(), 'scenes': results})
+            results[scene.name] = result_of(scene, costmaps, with_people)
+            print(line_of(scene.name, **results[scene.name]), flush=True)
+    return {'machine': describe_machine(), 'scenes': results}
+
+
+def add_options(parser):
+    """Add the options of the command."""
+    add_scenarios(parser, *SCENES)

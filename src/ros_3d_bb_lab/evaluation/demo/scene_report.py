@@ -20,8 +20,8 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb.visualization.image_overlay import draw_boxes, draw_caption
 from ros_3d_bb_lab.evaluation.clear_mot import Moment, score, table
-from ros_3d_bb_lab.evaluation.html_report import html_report
-from ros_3d_bb_lab.evaluation.report_blocks import Figure, Paragraph, Table
+from ros_3d_bb_lab.evaluation.html_report import Figure, Paragraph, Table, html_report
+from ros_3d_bb_lab.evaluation.text_table import lines_of
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import BASE_FRAME, MAP_FRAME, ODOM_FRAME, TRUTH_TOPIC
 
 matplotlib.use('Agg')
@@ -107,12 +107,6 @@ def write_csv(bag_path, csv_path):
                 covariance = [''] * 3 if track.covariance is None else track.covariance[[0, 0, 1], [0, 1, 1]]
                 rows.writerow([stamp, track.id, track.label, track.status, *track.position_m[:2],
                                *track.velocity_mps[:2], *covariance])
-
-
-def lines_of(header, rows):
-    """Format a table of text as lines with columns that are aligned to the right."""
-    widths = [max(map(len, column)) for column in zip(header, *rows)]
-    return ['  '.join(text.rjust(width) for text, width in zip(row, widths)) for row in [header] + rows]
 
 
 def topics_of_cameras(bag, topic):

@@ -1,4 +1,1 @@
-"""Benchmark of the pipeline on scenes in Gazebo, with a Jackal and its D435i, against the true positions of Gazebo.
-
-May import: bags, conversions, core, tracking, lab.evaluation, lab.simulation.
-"""
+"""Benchmark of the pipeline on scenes in Gazebo, with a Jackal and its D435i, against the true positions of Gazebo."""

@@ -1,8 +1,6 @@
 """Scenes in Gazebo, with the camera of a standing Jackal: our estimator and tracker beside those of the thesis."""
-import argparse
 import json
 import os
-import shutil
 import subprocess
 import tempfile
 
@@ -17,10 +15,11 @@ from ros_3d_bb.conversions.perception_msgs import NEWEST, TRACKS_TOPIC, stamp_of
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import VISIBLE, CameraView
 from ros_3d_bb_lab.evaluation.clear_mot import Moment, score
-from ros_3d_bb_lab.evaluation.defaults import describe_machine, scenario_path, scenario_paths, write_json
+from ros_3d_bb_lab.evaluation.defaults import add_scenarios, describe_machine, scene_name
 from ros_3d_bb_lab.evaluation.gazebo.people_truth import PREDICTION_S, PeopleTruth
 from ros_3d_bb_lab.evaluation.launching import free_port, running_roslaunch
 from ros_3d_bb_lab.evaluation.scene_benchmark import score_tracks
+from ros_3d_bb_lab.evaluation.text_table import line_of
 from ros_3d_bb_lab.simulation.gazebo_world import world_of
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 
@@ -31,8 +30,6 @@ START_S = 4.0  # simulated time at which people begin to move
 SETTLING_S = 0.5  # Gazebo places people at the origin for a moment when they start
 TIMEOUT_S = 600.0
 TRACKERS = {'ours': {}, 'thesis': {'bbox3d': {'estimator': 'median'}, 'tracker': {'tracker': 'thesis'}}}
-COLUMNS = '%-22s %-7s %6s %7s %8s %8s %8s %8s %9s %9s'
-TITLES = ('scene', 'tracker', 'images', 'rate', 'tracked', 'switches', 'position', 'velocity', '1 s ahead', '2 s ahead')
 
 
 def record_scene(scenario, folder):
@@ -120,47 +117,31 @@ def result_of(moments):
     return result
 
 
-def main():
-    """Run the command `./run bench gazebo`."""
-    arguments = _parser().parse_args()
+def run(arguments):
+    """Record each scenario, and run both trackers on it."""
     detector = (['--detector', 'yolov5', '--weights', os.path.abspath(arguments.weights)] if arguments.weights
                 else ['--detector', 'depth'])
     print(describe_machine(), flush=True)
-    print(COLUMNS % TITLES)
     results = []
     for path in arguments.scenarios:
-        results += _run(path, detector, arguments.bags)
-    write_json(arguments.json, {'machine': describe_machine(), 'detector': detector[1], 'scenes': results})
+        results += _run(path, detector)
+    return {'machine': describe_machine(), 'detector': detector[1], 'scenes': results}
 
 
-def _parser():
-    parser = argparse.ArgumentParser(prog='./run bench gazebo', description=__doc__)
-    parser.add_argument('scenarios', nargs='*', type=scenario_path, metavar='SCENARIO',
-                        default=scenario_paths('thesis_*'),
-                        help='names in config/scenarios or files (default: thesis_*)')
+def add_options(parser):
+    """Add the options of the command."""
+    add_scenarios(parser, 'thesis_*')
     parser.add_argument('--weights', metavar='FILE', help='network of yolov5_node; without it, depth_detector_node')
-    parser.add_argument('--bags', metavar='DIR', help='existing folder for the recorded bags; those in it are used')
-    parser.add_argument('--json', metavar='FILE', help='also write the scores to FILE')
-    return parser
 
 
-def _run(path, detector, bags):
-    name, results = os.path.basename(path).replace('.yaml', ''), []
+def _run(path, detector):
+    results = []
     with tempfile.TemporaryDirectory() as folder:
-        kept = os.path.join(bags or folder, name + '.bag')
-        if not os.path.exists(kept):
-            shutil.move(record_scene(read_scenario(path), folder), kept)
+        recorded = record_scene(read_scenario(path), folder)
         for tracker in TRACKERS:
             target = os.path.join(folder, tracker + '.bag')
-            run_pipeline(kept, target, tracker, detector)
-            results.append(dict(result_of(moments_in(kept, target, int((START_S + SETTLING_S) * NS))),
-                                scene=name, tracker=tracker))
-            _print_row(results[-1])
+            run_pipeline(recorded, target, tracker, detector)
+            result = result_of(moments_in(recorded, target, int((START_S + SETTLING_S) * NS)))
+            results.append(dict(result, scene=scene_name(path), tracker=tracker))
+            print(line_of(**results[-1]), flush=True)
     return results
-
-
-def _print_row(result):
-    meters = ['-' if result[key] is None else '%.3f' % result[key]
-              for key in ('rmse_m', 'velocity_rmse_mps', 'prediction_1s_m', 'prediction_2s_m')]
-    print(COLUMNS % tuple([result['scene'], result['tracker'], result['images'], '%.1f Hz' % result['rate_hz'],
-                           '%.1f %%' % (100 * result['tracked']), result['id_switches']] + meters), flush=True)

@@ -14,13 +14,7 @@ MOVING_MPS = 0.2
 
 
 class PeopleTruth(object):
-    """Positions of people over time.
-
-    Parameters
-    ----------
-    states : iterable of (float, gazebo_msgs/ModelStates)
-        Simulated time in seconds, and the poses of all models at this time.
-    """
+    """Positions of people over time, from pairs of the simulated time in seconds and gazebo_msgs/ModelStates."""
 
     def __init__(self, states):
         times_s, positions_m = [], []

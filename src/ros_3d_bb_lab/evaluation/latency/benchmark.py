@@ -1,5 +1,4 @@
 """Latency of the complete pipeline, from the image stamp to the markers, by detector and CPU load."""
-import argparse
 import contextlib
 import json
 import os
@@ -9,16 +8,15 @@ import sys
 import tempfile
 from typing import NamedTuple
 
-from ros_3d_bb_lab.evaluation.defaults import default_weights, describe_machine, scenario_path, write_json
-from ros_3d_bb_lab.evaluation.latency.latency_result import LIMIT, SUBSCRIBING, result_of
+from ros_3d_bb_lab.evaluation.defaults import default_weights, describe_machine, in_range, scenario_path
+from ros_3d_bb_lab.evaluation.latency.latency_result import LIMIT, result_of
 from ros_3d_bb_lab.evaluation.launching import launch
+from ros_3d_bb_lab.evaluation.text_table import line_of, table_of
 
-IMAGES = 60  # first images of the scene, played forwards and backwards: 2 s, 90 MB
+IMAGES = 60  # first images of the demo, played forwards and backwards: 2 s, 90 MB
 BUSY_LOOP = 'import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n    pass'
 # Nodes of the benchmark, which do not run on a robot.
 HARNESS = 'replay_node', 'latency_probe_node', 'rosout', 'limit_audience'
-COLUMNS = '%-16s %6s %6s %8s %8s %8s %8s %9s %9s %9s %7s'
-TITLES = ('case', 'in Hz', 'out Hz', 'p50 ms', 'p95 ms', 'p99 ms', 'dropped', 'CPU %', 'camera %', 'memory MB', 'load')
 
 
 class Case(NamedTuple):
@@ -61,8 +59,7 @@ def measured(case, arguments, bag, folder):
             raise RuntimeError('%s: nothing was measured. The log:\n%s' % (case.name, stream.read()))
     result = dict(name=case.name, detector=case.name.split('+')[0], load='one core' if case.loaded else 'none')
     result.update(result_of(recorded), load_average=recorded['load_average'])
-    nodes = [node for node in result['cpu_percent']
-             if node not in HARNESS and not node.endswith((LIMIT, SUBSCRIBING))]
+    nodes = [node for node in result['cpu_percent'] if node not in HARNESS and not node.endswith(LIMIT)]
     return dict(result, pipeline={key: sum(result[key][node] for node in nodes) for key in ('cpu_percent', 'rss_mb')})
 
 
@@ -78,78 +75,65 @@ def cpu_load(cores):
             process.wait()
 
 
-def row(result):
-    """Format a result as a line of the table."""
-    times = ['-' if result[key] is None else '%.1f' % result[key] for key in ('p50_ms', 'p95_ms', 'p99_ms')]
-    return COLUMNS % ((result['name'], '%.1f' % result['input_hz'], '%.1f' % result['output_hz']) + tuple(times) + (
-        result['dropped'], '%.1f' % result['pipeline']['cpu_percent'],
-        '%.1f' % result['cpu_percent'].get('replay_node', 0), '%.0f' % result['pipeline']['rss_mb'],
-        '%.1f' % result['load_average']))
+def print_result(result):
+    """Print a result: a line, a table of the nodes, the latency by stage, and the trend."""
+    print(line_of(**{key: value for key, value in dict(result, **result['pipeline']).items()
+                     if not isinstance(value, dict)}))
+    grew = result['trend']['rss_mb_per_minute']
+    print('\n'.join(table_of({node: {'cpu_percent': result['cpu_percent'][node], 'rss_mb': result['rss_mb'][node],
+                                     'rss_mb_per_minute': grew[node],
+                                     'times_limit': result['nodes'].get(node, {}).get('times_limit')}
+                              for node in sorted(result['cpu_percent'])})))
+    print(line_of('median ms from stamp:', **result['stages_ms']))
+    for end in ('first', 'last'):
+        print(line_of('%s %.0f s:' % (end, result['trend']['edge_s']), **result['trend'][end]), flush=True)
 
 
-def details(result):
-    """Format the results by node and by stage, and the trend, as text."""
-    trend, grew = result['trend'], result['trend']['rss_mb_per_minute']
-    compared = {node: ', %.2f times its limit' % found['times_limit'] for node, found in result['nodes'].items()}
-    lines = ['  %-31s %5.1f %% of a core, %4.0f MB, %+.2f MB a minute'
-             % (node, result['cpu_percent'][node], result['rss_mb'][node], grew[node]) + compared.get(node, '')
-             for node in sorted(result['cpu_percent'])]
-    stages = ['%s %s' % (stage, '-' if value is None else '%.1f' % value)
-              for stage, value in result['stages_ms'].items()]
-    lines.append('  median ms from stamp: ' + ', '.join(stages))
-    if None not in (trend['first']['p50_ms'], trend['last']['p50_ms']):
-        lines.append('  first %.0f s: p50 %.1f, p99 %.1f ms; last: %.1f, %.1f ms' % (
-            trend['edge_s'], trend['first']['p50_ms'], trend['first']['p99_ms'], trend['last']['p50_ms'],
-            trend['last']['p99_ms']))
-    return '\n'.join(lines)
-
-
-def main():
-    """Run the command `./run bench latency`."""
-    arguments, cases = _arguments()
+def run(arguments):
+    """Measure each case."""
+    cases = _cases(arguments)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # runs the cleanup, which ends all processes
-    print(describe_machine())
+    print(describe_machine(), flush=True)
     results = []
     with tempfile.TemporaryDirectory() as folder:
         bag = arguments.bag and os.path.abspath(arguments.bag)
         if not bag:
             bag = os.path.join(folder, 'images.bag')
-            subprocess.check_call(['rosrun', 'ros_3d_bb', 'scenario_to_bag', arguments.scenario, bag, '--boxes',
+            subprocess.check_call(['rosrun', 'ros_3d_bb', 'scenario_to_bag', scenario_path('demo'), bag, '--boxes',
                                    '--images', str(IMAGES), '--compression', 'none'], stdout=subprocess.DEVNULL)
-        print(COLUMNS % TITLES, flush=True)
         for case in cases:
             results.append(measured(case, arguments, bag, folder))
-            print(row(results[-1]), details(results[-1]), sep='\n', flush=True)
-            write_json(arguments.json, {'machine': describe_machine(), 'cases': results})
+            print_result(results[-1])
+    return {'machine': describe_machine(), 'cases': results}
 
 
-def _arguments():
-    parser = argparse.ArgumentParser(prog='./run bench latency', description=__doc__)
-    parser.add_argument('--cases', help='some of free, depth, yolov5-512, yolov5-640, yolov5-auto and the names of '
-                        'further model files, each with or without +load, separated by commas (default: all)')
-    parser.add_argument('--seconds', type=float, default=20.0, help='duration of a measurement (default: 20)')
-    parser.add_argument('--rate', type=float, default=30.0, metavar='HZ', help='images per second (default: 30)')
-    parser.add_argument('--weights', nargs='+', default=list(filter(None, [default_weights()])), metavar='FILE',
-                        help='checkpoint or export of YOLOv5, and further model files, which are cases named by the '
-                        'file without suffix (default: yolov5n.pt in the cache, if any)')
-    images = parser.add_mutually_exclusive_group()
-    images.add_argument('--scenario', type=scenario_path, default='demo', metavar='SCENARIO',
-                        help='scenario; its first %d images are played (default: demo)' % IMAGES)
-    images.add_argument('--bag', help='bag written by scenario_to_bag or session_to_bag with --boxes')
-    parser.add_argument('--limits', action='store_true',
-                        help='also give the CPU usage of each node as a multiple of its limit: that of a bare rospy '
-                        'node that runs beside it, receives the same messages and publishes messages of the same size')
-    parser.add_argument('--separate', action='store_true', help='run each node in a process of its own')
-    parser.add_argument('--json', metavar='FILE', help='also write the results to this file')
-    arguments = parser.parse_args()
+def _cases(arguments):
+    """The cases that the arguments select. Raises ValueError."""
     if arguments.limits and not arguments.separate:
-        parser.error('--limits compares single nodes; expected together with --separate')
-    if not (arguments.seconds > 0 and arguments.rate > 0):
-        parser.error('--seconds %g, --rate %g: more than 0 expected' % (arguments.seconds, arguments.rate))
+        raise ValueError('--limits compares single nodes; expected together with --separate')
     known = {case.name: case for case in cases_of([os.path.abspath(path) for path in arguments.weights])}
     names = arguments.cases.split(',') if arguments.cases else list(known)
     for name in names:
         if name not in known:
-            parser.error('case %r is unknown; known: %s%s' % (name, ', '.join(known), '' if arguments.weights else
-                                                              '; cases of networks need --weights'))
-    return arguments, [known[name] for name in names]
+            raise ValueError('case %r is unknown; known: %s%s' % (name, ', '.join(known), '' if arguments.weights else
+                                                                  '; cases of networks need --weights'))
+    return [known[name] for name in names]
+
+
+def add_options(parser):
+    """Add the options of the command."""
+    parser.add_argument('--cases', help='some of free, depth, yolov5-512, yolov5-640, yolov5-auto and the names of '
+                        'further model files, each with or without +load, separated by commas (default: all)')
+    parser.add_argument('--seconds', type=in_range(float, 1), default=20.0,
+                        help='duration of a measurement (default: 20)')
+    parser.add_argument('--rate', type=in_range(float, 0.1), default=30.0, metavar='HZ',
+                        help='images per second (default: 30)')
+    parser.add_argument('--weights', nargs='+', default=list(filter(None, [default_weights()])), metavar='FILE',
+                        help='checkpoint or export of YOLOv5, and further model files, which are cases named by the '
+                        'file without suffix (default: yolov5n.pt in the cache, if any)')
+    parser.add_argument('--bag', help='bag written by scenario_to_bag or session_to_bag with --boxes (default: the '
+                        'first %d images of the demo)' % IMAGES)
+    parser.add_argument('--limits', action='store_true',
+                        help='also give the CPU usage of each node as a multiple of its limit: that of a bare rospy '
+                        'node that runs beside it, receives the same messages and publishes messages of the same size')
+    parser.add_argument('--separate', action='store_true', help='run each node in a process of its own')

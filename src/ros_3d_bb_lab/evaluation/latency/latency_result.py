@@ -2,7 +2,7 @@
 import numpy as np
 
 STAGES = 'boxes_2d', 'boxes_3d', 'tracks', 'markers'  # in processing order
-LIMIT, SUBSCRIBING = '_limit', '_subscribing'  # suffixes of the nodes with the topics of another, see `rospy_limit`
+LIMIT = '_limit'  # suffix of the node with the topics of another, see `rospy_limit`
 LEAST_PERCENT = 0.01  # CPU usage, so that a limit without any is not divided by
 EDGE_S = 60.0  # intervals at the start and at the end that are compared in `trend`
 
@@ -44,11 +44,9 @@ def result_of(record):
 def compared_with_limits(cpu_percent):
     """CPU usage of each node that has a limit, {node: dictionary}, from that of all nodes, in percent of a core.
 
-    `limit_percent` is that of a bare rospy node with the same topics, `subscribing_percent` that of one that publishes
-    nothing, and `times_limit` the usage of the node divided by its limit.
+    `limit_percent` is that of a bare rospy node with the same topics, `times_limit` the usage divided by this limit.
     """
     return {node: {'cpu_percent': percent, 'limit_percent': cpu_percent[node + LIMIT],
-                   'subscribing_percent': cpu_percent[node + SUBSCRIBING],
                    'times_limit': percent / max(cpu_percent[node + LIMIT], LEAST_PERCENT)}
             for node, percent in cpu_percent.items() if node + LIMIT in cpu_percent}
 

@@ -41,15 +41,15 @@ def topics_of(node, state):
 
 
 class Limit(object):
-    """Subscribes to the topics of a node as the node does, and discards the messages.
+    """Subscribes to the topics of a node as the node does, and publishes one message of each topic of the node that has
+    subscribers, whenever a message arrives on the `trigger`, one of the subscribed topics.
 
-    With a `trigger`, one of these topics, it also publishes: one message of each topic of the node that has
-    subscribers, whenever a message arrives on the trigger. The messages were published by the node; the topics have the
-    `PREFIX`, and `Audience` provides as many subscribers as the node has.
+    The messages were published by the node; the topics have the `PREFIX`, and `Audience` provides as many subscribers
+    as the node has.
     """
 
     def __init__(self, node, trigger):
-        self._node, self._trigger = rospy.resolve_name(node), trigger and rospy.resolve_name(trigger)
+        self._node, self._trigger = rospy.resolve_name(node), rospy.resolve_name(trigger)
         self._results = []  # (publisher, message)
 
     def start(self):
@@ -61,12 +61,11 @@ class Limit(object):
             is_image, is_trigger = kinds[topic] is Image, topic == self._trigger
             rospy.Subscriber(topic, kinds[topic], self._publish if is_trigger else _discard, queue_size=AT_ONCE,
                              tcp_nodelay=True, buff_size=IMAGE_BUFFER if is_image else SMALL_BUFFER)
-        if self._trigger:
-            time.sleep(SETTLING_S)
-            _subscribed, published = topics_of(self._node, patient_master().getSystemState())
-            for topic in [topic for topic, audience in published.items() if audience]:
-                message = rospy.wait_for_message(topic, kinds[topic])
-                self._results.append((rospy.Publisher(PREFIX + topic, kinds[topic], queue_size=10), message))
+        time.sleep(SETTLING_S)
+        _subscribed, published = topics_of(self._node, patient_master().getSystemState())
+        for topic in [topic for topic, audience in published.items() if audience]:
+            message = rospy.wait_for_message(topic, kinds[topic])
+            self._results.append((rospy.Publisher(PREFIX + topic, kinds[topic], queue_size=10), message))
 
     def _publish(self, _message):
         for publisher, message in list(self._results):

@@ -31,7 +31,7 @@ from ros_3d_bb_lab.simulation.scenario import read_scenario
 REACHED_M = 0.4  # the goal tolerance of move_base is 0.3 m
 POLL_S = 0.002
 START_TIMEOUT_S, TRIAL_TIMEOUT_S = 180.0, 600.0  # of the machine's time
-WARM_UP_S = 1.0  # of the published time, with standing people
+WARM_UP_S, LONGEST_S = 1.0, 30.0  # of the published time: with standing people before a trial, and of a trial
 
 
 @parameters()
@@ -47,7 +47,6 @@ class NavigationTrialParams(NamedTuple):
     cloud: bool = Param(False, 'Whether the points of the depth images are published.', section=SET_BY_LAUNCH)
     visible: bool = Param(False, 'Whether the true tracks of visible people are published.', section=SET_BY_LAUNCH)
     scan: bool = Param(False, 'Whether the scan of a planar laser is published.', section=SET_BY_LAUNCH)
-    timeout: float = Param(30.0)
 
 
 class NavigationTrialNode(object):
@@ -194,7 +193,7 @@ class NavigationTrialNode(object):
             elapsed_s = (self._now_ns() - start_ns) / NS
             if distance_m(self._pose[:2], (self._params.goal_x, self._params.goal_y)) < REACHED_M:
                 return elapsed_s
-            if elapsed_s > self._params.timeout:
+            if elapsed_s > LONGEST_S:
                 return None
             time.sleep(POLL_S)
         return None

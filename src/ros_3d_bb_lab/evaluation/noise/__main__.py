@@ -1,4 +1,4 @@
-"""Analyse the noise of measured positions: figures, normality tests, error models and a report.
+"""Analyse the noise of measured positions: figures, a normality test, an error model and a report.
 
 With --recordings, fit an error model to recorded 3D boxes of moving people with ground truth. Only this measures the
 section `detector` of the model; sessions and tables write its defaults.

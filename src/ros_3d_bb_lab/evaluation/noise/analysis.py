@@ -1,12 +1,12 @@
-"""Noise analysis: statistics of both axes, and the resulting error models."""
+"""Noise analysis: statistics of both axes, and the resulting error model."""
 import datetime
 import os
 from typing import NamedTuple, Optional, Tuple
 
-from ros_3d_bb.estimation.error_model import ErrorModel, MeasuredRange, Provenance, Spread, XBias, checked
+from ros_3d_bb.estimation.error_model import ErrorModel
 from ros_3d_bb.sessions.plausibility import Outlier
-from ros_3d_bb_lab.evaluation.error_model_fit import GROWTH_OUTSIDE, LEAST_SIGMA_M, Y_SIGMA_M, fit_error_model
-from ros_3d_bb_lab.evaluation.noise.statistics import AxisStatistics, axis_statistics, share_between_positions
+from ros_3d_bb_lab.evaluation.error_model_fit import fit_error_model
+from ros_3d_bb_lab.evaluation.noise.statistics import AxisStatistics, axis_statistics
 from ros_3d_bb_lab.evaluation.noise.tables import MeasurementTable, clusters_of
 
 Z_DEGREE, X_DEGREE = 2, 1
@@ -45,21 +45,14 @@ class Inputs(NamedTuple):
 class Analysis(NamedTuple):
     """Results of `./run noise`.
 
-    `x` contains the mean errors, and `x_variance` the variances. `z_between` and `x_between` are from
-    `share_between_positions`.
-
-    `model` is the cross-validated error model; if it is None, `no_model` is the reason. `thesis_form` is the error
-    model in the form of the thesis, with the same polynomials and the largest variance at all positions; None if its
-    bias is not invertible. `date` is that of the analysis.
+    `x` contains the mean errors, and `x_variance` the variances. `model` is the cross-validated error model; if it is
+    None, `no_model` is the reason. `date` is that of the analysis.
     """
 
     inputs: Inputs
     z: AxisStatistics
     x: AxisStatistics
     x_variance: AxisStatistics
-    z_between: Optional[float]
-    x_between: Optional[float]
-    thesis_form: Optional[ErrorModel]
     model: Optional[ErrorModel]
     no_model: str
     date: str
@@ -71,12 +64,8 @@ class Analysis(NamedTuple):
 
     @property
     def model_note(self):
-        """Why there is no cross-validated error model, and what error_model.yaml is instead; '' if there is one."""
-        if self.model is not None:
-            return ''
-        return 'no cross-validated error model: %s; %s' % (self.no_model, (
-            'no error_model.yaml is written' if self.thesis_form is None
-            else 'error_model.yaml has the form of the thesis instead'))
+        """Why there is no error model; '' if there is one."""
+        return '' if self.model is not None else 'no error_model.yaml is written: %s' % self.no_model
 
 
 def analyse(inputs):
@@ -88,13 +77,14 @@ def analyse(inputs):
     except ValueError as error:
         raise ValueError('%s, without people who are truncated by the left or right image border' % error)
     names = set(os.path.basename(os.path.abspath(table.name)) for table in (inputs.z, inputs.x, inputs.x_variance))
-    origin = {'source': ', '.join(sorted(names)), 'estimator': inputs.estimator, 'camera': inputs.camera,
-              'date': datetime.date.today().isoformat()}
-    thesis_form, _reason = _or_reason(_thesis_form, z, x, x_variance, origin)
-    known = inputs.x.complete()
-    model, reason = _or_reason(fit_error_model, known.measured_m, known.truth_m, **origin)
-    return Analysis(inputs, z, x, x_variance, share_between_positions(inputs.z, 'Z'),
-                    share_between_positions(inputs.x_variance, 'X'), thesis_form, model, reason, origin['date'])
+    known, today = inputs.x.complete(), datetime.date.today().isoformat()
+    model, reason = None, ''
+    try:
+        model = fit_error_model(known.measured_m, known.truth_m, ', '.join(sorted(names)), inputs.estimator,
+                                inputs.camera, today)
+    except ValueError as error:
+        reason = str(error)
+    return Analysis(inputs, z, x, x_variance, model, reason, today)
 
 
 def summary_of(analysis):
@@ -112,22 +102,3 @@ def summary_of(analysis):
 def _axis_summary(axis):
     return {'poly': list(axis.poly), 'max_variance_m2': axis.max_variance_m2, 'max_sigma_m': axis.max_sigma_m,
             'clusters': [dict(cluster._asdict()) for cluster in axis.clusters]}
-
-
-def _or_reason(function, *arguments, **origin):
-    """Call a function. Returns (result, '') or, if it raises ValueError, (None, message)."""
-    try:
-        return function(*arguments, **origin), ''
-    except ValueError as error:
-        return None, str(error)
-
-
-def _thesis_form(z, x, x_variance, origin):
-    """Error model in the form of the thesis, from these statistics."""
-    z_m, x_m = ([cluster.truth_m for cluster in axis.clusters] for axis in (z, x))
-    count = sum(cluster.count for cluster in z.clusters)
-    return checked(ErrorModel(
-        z.poly, XBias(x.poly[0], 0.0, x.poly[1]), Spread(max(z.max_sigma_m, LEAST_SIGMA_M), 0.0, 0.0),
-        Spread(max(x_variance.max_sigma_m, LEAST_SIGMA_M), 0.0, 0.0), Y_SIGMA_M,
-        MeasuredRange(min(z_m), max(z_m), max(abs(value) for value in x_m), min(z_m)), GROWTH_OUTSIDE,
-        Provenance(measurements=count, positions=len(z_m), **origin), None))

@@ -1,16 +1,15 @@
-"""Output of the noise analysis: a folder with a report, its figures, a summary and error models, and a short text."""
+"""Output of the noise analysis: a folder with a report, its figures, a summary and an error model, and a short text."""
 import json
 
 import numpy as np
 
 from ros_3d_bb.estimation.error_model import write_error_model
 from ros_3d_bb.sessions.plausibility import position_text
-from ros_3d_bb_lab.evaluation.html_report import html_report
+from ros_3d_bb_lab.evaluation.html_report import Figure, Heading, Paragraph, Table, html_report, numbered
 from ros_3d_bb_lab.evaluation.noise.analysis import summary_of
 from ros_3d_bb_lab.evaluation.noise.figures import polynomial_text, write_figures
 from ros_3d_bb_lab.evaluation.noise.statistics import LEAST_TO_TEST
 from ros_3d_bb_lab.evaluation.noise.tables import LEAST_IN_CLUSTER, small_clusters
-from ros_3d_bb_lab.evaluation.report_blocks import Figure, Heading, Paragraph, Table, numbered
 
 TITLE = 'Position errors of a depth camera'
 ESTIMATORS = {'foreground': 'foreground (that of bbox3d_node)', 'median': 'median (that of the thesis)',
@@ -18,9 +17,9 @@ ESTIMATORS = {'foreground': 'foreground (that of bbox3d_node)', 'median': 'media
 
 
 def write_results(folder, analysis):
-    """Write the report as HTML, its figures, summary.json and the error models into a folder (pathlib.Path).
+    """Write the report as HTML, its figures, summary.json and the error model into a folder (pathlib.Path).
 
-    The folder is created if it does not exist. Error models of an earlier analysis do not remain. Raises OSError.
+    The folder is created if it does not exist. The error model of an earlier analysis does not remain. Raises OSError.
     """
     folder.mkdir(parents=True, exist_ok=True)
     captions = write_figures(folder, analysis)
@@ -30,12 +29,11 @@ def write_results(folder, analysis):
                            for block in blocks if not isinstance(block, Figure) or block.name in captions))
     (folder / 'report.html').write_text(html_report(TITLE, blocks, folder), encoding='utf-8')
     (folder / 'summary.json').write_text(json.dumps(summary_of(analysis), indent=1), encoding='utf-8')
-    for name, model in (('error_model_thesis_form.yaml', analysis.thesis_form),
-                        ('error_model.yaml', analysis.model or analysis.thesis_form)):
-        if model is not None:
-            write_error_model(folder / name, model)
-        elif (folder / name).exists():
-            (folder / name).unlink()
+    model_path = folder / 'error_model.yaml'
+    if analysis.model is not None:
+        write_error_model(model_path, analysis.model)
+    elif model_path.exists():
+        model_path.unlink()
 
 
 def text_of(analysis):
@@ -79,8 +77,7 @@ def _bias_text(analysis):
     return ('At Z = %.2f m the mean error in Z is %+.3f m, %.1f times the standard deviation there: inflating '
             'obstacles by σ alone does not cover it.%s' % (
                 far.truth_m, far.mean_m, abs(far.mean_m) / max(far.sigma_m, 1e-6),
-                '' if analysis.model is None and analysis.thesis_form is None
-                else ' The error model corrects the mean error.'))
+                '' if analysis.model is None else ' The error model corrects the mean error.'))
 
 
 def _setup(analysis):
@@ -131,16 +128,15 @@ def _left_out(analysis):
 
 def _z(analysis):
     return [Heading('Errors in Z, the distance ahead'),
-            Paragraph('f(z) = %s metres, fitted to the mean errors of the clusters with equal weights. %s' % (
-                polynomial_text(analysis.z.poly, 'z'), _between_text(analysis.z_between, 'Z', 'X'))),
+            Paragraph('f(z) = %s metres, fitted to the mean errors of the clusters with equal weights.'
+                      % polynomial_text(analysis.z.poly, 'z')),
             Figure('z_error.png', ''), _cluster_table(analysis.z, 'Z', 'errors in Z by true Z'),
             Figure('z_variance.png', '')]
 
 
 def _x(analysis):
     pieces = [Heading('Errors in X, to the side'),
-              Paragraph('f(x) = %s metres. %s' % (polynomial_text(analysis.x.poly, 'x'),
-                                                  _between_text(analysis.x_between, 'X', 'Z'))),
+              Paragraph('f(x) = %s metres.' % polynomial_text(analysis.x.poly, 'x')),
               Figure('x_error.png', ''), _cluster_table(analysis.x, 'X', 'errors in X by true X')]
     if analysis.x_variance != analysis.x:
         pieces += [Paragraph('The mean error is that of all measurements. Variance and distribution are those of the '
@@ -151,18 +147,14 @@ def _x(analysis):
 
 
 def _distributions(analysis):
-    header = ('cluster', 'n', 'Shapiro–Wilk p', 'Anderson–Darling', 'critical at 5 %', 'Gaussian?')
     tested = [cluster for _name, cluster in analysis.variance_clusters if cluster.tested]
     return [
         Heading('Distribution of the errors'),
-        Paragraph('Both tests accept a Gaussian for %d of %d tested clusters. Shapiro–Wilk rejects a Gaussian if p is '
-                  'below 0.05, Anderson–Darling if its statistic exceeds the critical value. Small clusters are seldom '
-                  'rejected, which does not prove that they are Gaussian. Clusters with fewer than %d measurements, or '
-                  'with equal errors, are not tested.' % (sum(cluster.looks_gaussian for cluster in tested),
-                                                          len(tested), LEAST_TO_TEST)),
-        Figure('z_distribution.png', ''), Figure('x_distribution.png', ''),
-        Table('normality tests', header, tuple(
-            _distribution_row(name, cluster) for name, cluster in analysis.variance_clusters))]
+        Paragraph('The Shapiro–Wilk test accepts a Gaussian for %d of %d tested clusters. It rejects a Gaussian if p '
+                  '(in the tables of the clusters) is below 0.05. Small clusters are seldom rejected, which does not '
+                  'prove that they are Gaussian. Clusters with fewer than %d measurements, or with equal errors, are '
+                  'not tested.' % (sum(cluster.looks_gaussian for cluster in tested), len(tested), LEAST_TO_TEST)),
+        Figure('z_distribution.png', ''), Figure('x_distribution.png', '')]
 
 
 def _model(analysis):
@@ -170,17 +162,13 @@ def _model(analysis):
         pieces = [Paragraph('%s%s.' % (analysis.model_note[:1].upper(), analysis.model_note[1:]))]
     else:
         pieces = _model_pieces(analysis.model)
-    return [Heading('Error model and its validation')] + pieces + [Paragraph(
-        ('error_model_thesis_form.yaml has the form of the thesis: the polynomials of the first table, and the largest '
-         'standard deviation at all positions.' if analysis.thesis_form is not None
-         else 'There is no model in the form of the thesis: the polynomials of the first table are not invertible.'))]
+    return [Heading('Error model and its validation')] + pieces
 
 
 def _model_pieces(model):
     scores, limits = model.cross_validated, model.measured_range
     z_bias = ' '.join('%+.4f%s' % (value, {0: '', 1: ' z', 2: ' z²', 3: ' z³'}[len(model.z_bias) - 1 - number])
                       for number, value in enumerate(model.z_bias))
-    ranges_m = [limits.z_min_m + share * (limits.z_max_m - limits.z_min_m) for share in (0, 0.25, 0.5, 0.75, 1)]
     return [
         Paragraph('error_model.yaml, in the folder of this report, is for bbox3d_node (error_model:=FILE), which '
                   'removes the bias and sets the covariance of positions. It is fitted to the %d measurements with '
@@ -192,44 +180,21 @@ def _model_pieces(model):
             ('measured range', 'Z from %.2f to %.2f m, |X| to %.2f m'
              % (limits.z_min_m, limits.z_max_m, limits.x_max_m)),
             ('outside of it', 'bias as at its limit; σ grows by %.1f m per metre' % model.growth_outside))),
-        Table('standard deviation of the model by range', ('true Z [m]', 'σ of X [m]', 'σ of Z [m]'), tuple(
-            ('%.2f' % range_m, '%.4f' % model.x_sigma.at(range_m), '%.4f' % model.z_sigma.at(range_m))
-            for range_m in ranges_m)),
         Figure('sigma.png', ''),
         Paragraph('Leave-one-position-out cross-validation: the measurements of each position are corrected by a model '
                   'of all other positions. The coverage is the share of them inside the ellipse of that model; ideally '
-                  'it is that of the ellipse. σ is widened until the 95 % ellipse contains 95 %, because errors have '
-                  'longer tails than a Gaussian; the 68 % ellipse then contains more than 68 %.'),
-        Table('leave-one-position-out cross-validation', ('quantity', 'value'), (
-            ('RMSE in X', '%.3f m' % scores.rmse_x_m), ('RMSE in Z', '%.3f m' % scores.rmse_z_m),
-            ('RMSE in the plane', '%.3f m' % scores.rmse_plane_m),
-            ('coverage of the 68 % ellipse', '%.0f %%' % (100 * scores.coverage_68)),
-            ('coverage of the 95 % ellipse', '%.0f %%' % (100 * scores.coverage_95))))]
+                  'it is that of the ellipse. σ is widened until the 95 %% ellipse contains 95 %%, because errors have '
+                  'longer tails than a Gaussian; the 68 %% ellipse then contains more, here %.0f %%.'
+                  % (100 * scores.coverage_68))]
 
 
 def _cluster_table(axis, name, caption):
     return Table(caption, ('true %s [m]' % name, 'n', 'mean error [m]', 'standard deviation [m]', 'variance [m²]',
-                           'RMS [m]'),
+                           'RMS [m]', 'Shapiro–Wilk p'),
                  tuple(('%.2f' % cluster.truth_m, '%d' % cluster.count, '%+.4f' % cluster.mean_m,
-                        '%.4f' % cluster.sigma_m, '%.6f' % cluster.variance_m2, '%.4f' % cluster.rms_m)
+                        '%.4f' % cluster.sigma_m, '%.6f' % cluster.variance_m2, '%.4f' % cluster.rms_m,
+                        '%.4f' % cluster.shapiro_p if cluster.tested else 'not tested')
                        for cluster in axis.clusters))
-
-
-def _distribution_row(name, cluster):
-    row = ('%s = %.2f m' % (name, cluster.truth_m), '%d' % cluster.count)
-    if not cluster.tested:
-        return row + ('not tested', '', '', '')
-    return row + (
-        '%.4f' % cluster.shapiro_p, '%.2f' % cluster.anderson, '%.2f' % cluster.anderson_critical,
-        'not rejected' if cluster.looks_gaussian else 'no')
-
-
-def _between_text(share, axis, other):
-    if share is None:
-        return ''
-    return ('%.0f %% of the variance within the %s clusters is between positions of different %s, not between '
-            'repetitions at one position%s.' % (100 * share, axis, other,
-                                                '; it is bias rather than noise' if share > 0.5 else ''))
 
 
 def _spread_text(spread):

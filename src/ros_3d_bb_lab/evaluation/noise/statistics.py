@@ -1,20 +1,18 @@
-"""Statistics of clusters of errors: moments and normality tests."""
+"""Statistics of clusters of errors: moments and a normality test."""
 from typing import NamedTuple, Optional
 
 import numpy as np
 from scipy import stats
 
-from ros_3d_bb_lab.evaluation.noise.tables import AXES
-
 SIGNIFICANCE = 0.05
-LEAST_TO_TEST = 8  # measurements; the critical values of Anderson-Darling are undefined below
+LEAST_TO_TEST = 8  # measurements
 
 
 class ClusterStatistics(NamedTuple):
     """Statistics of one cluster, in metres.
 
-    `variance_m2` is divided by n, as in the thesis. The other fields are results of the Shapiro-Wilk and
-    Anderson-Darling tests; None if all errors are equal, or if there are fewer than 8.
+    `variance_m2` is divided by n, as in the thesis. `shapiro_p` is the result of the Shapiro-Wilk test; None if all
+    errors are equal, or if there are fewer than 8.
     """
 
     truth_m: float
@@ -23,8 +21,6 @@ class ClusterStatistics(NamedTuple):
     variance_m2: float
     rms_m: float
     shapiro_p: Optional[float] = None
-    anderson: Optional[float] = None
-    anderson_critical: Optional[float] = None
 
     @property
     def sigma_m(self):
@@ -32,13 +28,13 @@ class ClusterStatistics(NamedTuple):
 
     @property
     def tested(self):
-        """Whether there were enough measurements for the tests."""
+        """Whether there were enough measurements for the test."""
         return self.shapiro_p is not None
 
     @property
     def looks_gaussian(self):
-        """Whether neither test rejects a Gaussian at 5 %."""
-        return self.tested and self.shapiro_p >= SIGNIFICANCE and self.anderson < self.anderson_critical
+        """Whether the test does not reject a Gaussian at 5 %."""
+        return self.tested and self.shapiro_p >= SIGNIFICANCE
 
 
 class AxisStatistics(NamedTuple):
@@ -63,35 +59,10 @@ def axis_statistics(clusters, degree):
     return AxisStatistics(tuple(poly.tolist()), described)
 
 
-def share_between_positions(measurements, axis):
-    """Share 0..1 of the variance within the clusters of an axis that is between positions on the other axis.
-
-    None if no measurement has both.
-    """
-    known = measurements.complete()
-    number = AXES.index(axis)
-    error_m = known.measured_m[:, 2 * number] - known.truth_m[:, number]
-    if not len(error_m):
-        return None
-    clusters, positions = (np.unique(truth, axis=0, return_inverse=True)[1].reshape(-1)
-                           for truth in (known.truth_m[:, [number]], known.truth_m))
-    whole, within = (_variance_within(error_m, group) for group in (clusters, positions))
-    return float(1 - within / whole) if whole > 0 else None
-
-
-def _variance_within(values, group):
-    """Mean squared deviation of values (n,) from the mean of their group (n,)."""
-    counts = np.bincount(group)
-    return float(np.mean((values - (np.bincount(group, values) / counts)[group]) ** 2))
-
-
 def cluster_statistics(cluster):
     error_m = cluster.error_m
     found = ClusterStatistics(cluster.truth_m, len(error_m), float(error_m.mean()), float(error_m.var()),
                               float(np.sqrt((error_m ** 2).mean())))
     if len(error_m) < LEAST_TO_TEST or np.ptp(error_m) == 0:
         return found
-    anderson = stats.anderson(error_m, 'norm')
-    return found._replace(
-        shapiro_p=float(stats.shapiro(error_m)[1]), anderson=float(anderson[0]),
-        anderson_critical=float(anderson[1][list(anderson[2]).index(5.0)]))
+    return found._replace(shapiro_p=float(stats.shapiro(error_m)[1]))

@@ -17,31 +17,28 @@ from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S
 
 PAIRED_M, MATCHED_M = 1.0, 0.5
-RANGES_M = 0, 8, 16, 40  # limits of the bands in which the ellipses are checked
 WITHIN_95 = 5.991  # 95 % quantile of chi squared with 2 degrees of freedom
 
 
 def score_run(run, outputs):
     """Score a tracker on a run_generator.Run, with a list of TrackedObject after each image.
 
-    Returns the results of TrackEval's HOTA, CLEAR and Identity metrics, the errors (n, 2 + horizons, 3) of the n
-    matched tracks in position, velocity and the predictions for `HORIZONS_S`, and the ranges (n,) of the people. An
-    error is x and y, NaN if the truth is unknown, and the squared Mahalanobis distance, NaN for tracks without
-    covariance.
+    Returns the results of TrackEval's HOTA, CLEAR and Identity metrics, and the errors (n, 2 + horizons, 3) of the n
+    matched tracks in position, velocity and the predictions for `HORIZONS_S`. An error is x and y, NaN if the truth is
+    unknown, and the squared Mahalanobis distance, NaN for tracks without covariance.
     """
-    people, tracks, similarities, errors, ranges_m = [], [], [], [], []
+    people, tracks, similarities, errors = [], [], [], []
     for image, objects in zip(run.images, outputs):
-        person_ids, track_ids, similarity, image_errors, image_ranges_m = _score_image(
+        person_ids, track_ids, similarity, image_errors = _score_image(
             image.truth, objects, run.in_scored_area(image, objects))
         people.append(person_ids)
         tracks.append(track_ids)
         similarities.append(similarity)
         errors += image_errors
-        ranges_m += image_ranges_m
     data = trackeval_data(people, tracks, similarities)
     with contextlib.redirect_stdout(io.StringIO()):
         results = [metric.eval_sequence(data) for metric in trackeval_metrics()]
-    return results, np.reshape(errors, (-1, 2 + len(HORIZONS_S), 3)), np.array(ranges_m)
+    return results, np.reshape(errors, (-1, 2 + len(HORIZONS_S), 3))
 
 
 def scores_of(run_scores):
@@ -49,7 +46,7 @@ def scores_of(run_scores):
 
     Scores are in percent, lengths in metres, and coverage is a share 0..1. Values without data are None.
     """
-    results_of_runs, errors_of_runs, ranges_of_runs = zip(*run_scores)
+    results_of_runs, errors_of_runs = zip(*run_scores)
     combined = []
     for metric, results in zip(trackeval_metrics(), zip(*results_of_runs)):
         combined.append(metric.combine_sequences({str(number): result for number, result in enumerate(results)}))
@@ -68,23 +65,11 @@ def scores_of(run_scores):
         scores.update({'ade_%ds_m' % horizon_s: _mean(lengths[:, 2:last + 1]),
                        'fde_%ds_m' % horizon_s: _mean(lengths[:, last]),
                        'coverage_95_%ds' % horizon_s: _coverage(distances[:, last])})
-    scores['coverage_95_by_range'] = _coverage_by_range(distances, np.concatenate(ranges_of_runs))
     return scores
 
 
-def _coverage_by_range(distances, ranges_m):
-    """Coverage of the positions now and at the horizons of 1 s and 2 s, for each band of `RANGES_M`."""
-    columns = [('position', 0)] + [('%ds' % horizon_s, 2 + int(np.flatnonzero(HORIZONS_S == horizon_s)[0]))
-                                   for horizon_s in (1, 2)]
-    bands = {}
-    for near_m, far_m in zip(RANGES_M[:-1], RANGES_M[1:]):
-        inside = distances[(ranges_m >= near_m) & (ranges_m < far_m)]
-        bands['%d-%d' % (near_m, far_m)] = {name: _coverage(inside[:, column]) for name, column in columns}
-    return bands
-
-
 def _score_image(truth, objects, counted):
-    """IDs of the scored people and tracks, their similarity (people, tracks), and the errors and range of each pair.
+    """IDs of the scored people and tracks, their similarity (people, tracks), and the errors of each pair.
 
     `counted` (n,) masks the tracks that are false positives without a person.
     """
@@ -98,8 +83,7 @@ def _score_image(truth, objects, counted):
     similarity = np.maximum(0, 1 - distances_m[:, counted] / PAIRED_M)
     rows = np.flatnonzero(counts)
     return (truth.ids[counts], np.array([thing.id for thing in objects], int)[counted], similarity,
-            [_errors(truth, rows[row], objects[column]) for row, column in pairs],
-            [np.linalg.norm(truth.position_m[rows[row]] - truth.pose[:2]) for row, _column in pairs])
+            [_errors(truth, rows[row], objects[column]) for row, column in pairs])
 
 
 def _errors(truth, row, thing):

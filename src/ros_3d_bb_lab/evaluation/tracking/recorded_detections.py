@@ -6,7 +6,6 @@ with z up, both for each image. `truth.csv` has the centres of people in the fix
 `ignored.csv` has other objects in the fixed frame, such as cyclists, and regions of the image without annotation
 (`DONT_CARE`). Scores outside of 0..1 are those of PointRCNN, and are converted to 0..1.
 """
-import csv
 import json
 import os
 from typing import Any, NamedTuple, Tuple
@@ -15,8 +14,11 @@ import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera, transform_from, transform_points
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.association import plane_distances
+from ros_3d_bb.tracking.association import assign, plane_distances
 from ros_3d_bb.tracking.types import OUT_OF_VIEW, VISIBLE, CameraView, Detection
+from ros_3d_bb_lab.evaluation.tracking.csv_tables import read_rows
+from ros_3d_bb_lab.evaluation.tracking.detection_generator import FALSE
+from ros_3d_bb_lab.evaluation.tracking.metrics import MATCHED_M
 from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S, UNSCORED_M, Image, RunTruth
 from ros_3d_bb_lab.evaluation.tracking.trajectories import pedestrian_of
 
@@ -76,6 +78,22 @@ def _corrected(detections, fixed_from_camera, model):
     return corrected
 
 
+def with_sources(run):
+    """The RecordedRun with the person that each box shows, for perfect association: people and boxes within `MATCHED_M`
+    are matched one to one, as many as possible, with the least sum of distances. The other boxes are false."""
+    return run._replace(images=tuple(image._replace(sources=_sources(image)) for image in run.images))
+
+
+def _sources(image):
+    sources = np.full(len(image.detections), FALSE)
+    if len(sources) and len(image.truth.ids):
+        places_m = np.array([detection.position_m for detection in image.detections])
+        distances_m = plane_distances(places_m, image.truth.position_m)
+        rows, columns = assign(np.where(distances_m <= MATCHED_M, distances_m, np.inf))
+        sources[rows] = image.truth.ids[columns]
+    return sources.tolist()
+
+
 def read_recordings(folder, every=1, with_odometry=True):
     """Yield the runs of the recordings in the subfolders of a folder, or of a folder that is itself a recording.
 
@@ -95,7 +113,8 @@ def read_recordings(folder, every=1, with_odometry=True):
 
 def _read_recording(folder, every, with_odometry):
     camera = _camera(os.path.join(folder, 'camera.json'))
-    tables = {name: _table(os.path.join(folder, name + '.csv'), columns.split(',')) for name, columns in TABLES.items()}
+    tables = {name: read_rows(os.path.join(folder, name + '.csv'), columns.split(','), ('id', 'kind'))
+              for name, columns in TABLES.items()}
     detections, poses = tables['detections'], tables['poses']
     stamps = [_stamp_ns(pose['t_s']) for pose in poses]
     cameras = {stamp: transform_from([pose[key] for key in ('x_m', 'y_m', 'z_m')],
@@ -187,21 +206,3 @@ def _camera(path):
             return Camera(*(content[key] for key in ('width', 'height', 'fx', 'fy', 'cx', 'cy')))
         except (KeyError, TypeError, ValueError) as error:
             raise ValueError('%s: not a camera: %r; the keys width, height, fx, fy, cx, cy expected' % (path, error))
-
-
-def _table(path, columns):
-    """Rows of a CSV file as dictionaries of numbers; `id` and `kind` are text."""
-    with open(path, newline='', encoding='utf-8-sig') as stream:
-        reader = csv.DictReader(stream)
-        if not set(columns) <= set(reader.fieldnames or ()):
-            raise ValueError('%s has the columns %s; %s expected'
-                             % (path, ','.join(reader.fieldnames or ()), ','.join(columns)))
-        return [_row(path, reader.line_num, line, columns) for line in reader]
-
-
-def _row(path, number, line, columns):
-    try:
-        return {key: line[key] if key in ('id', 'kind') else float(line[key]) for key in columns}
-    except (TypeError, ValueError):
-        raise ValueError('%s, line %d: %s; a number in each column expected'
-                         % (path, number, ','.join(str(line[key]) for key in columns)))

@@ -1,6 +1,5 @@
 """Trajectories of pedestrians in the plane: smoothed recordings, or generated trajectories if there are no recordings.
 """
-import csv
 import os
 from typing import Any, NamedTuple, Tuple
 
@@ -8,6 +7,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.sparse import csc_matrix, diags
 from scipy.sparse.linalg import spsolve
+
+from ros_3d_bb_lab.evaluation.tracking.csv_tables import read_rows
 
 COLUMNS = ('t_s', 'id', 'x_m', 'y_m')
 SMOOTHING = 0.004  # s^3; keeps the head motion of a step, removes the error of manual annotation in video
@@ -52,38 +53,19 @@ def read_sequences(folder):
 def read_sequence(path):
     """Read a recording: CSV with the columns t_s, id, x_m, y_m.
 
-    Points with a NaN or infinite position are treated as missing. Of several points of a person at the same time, the
-    first one is used. Segments between gaps with fewer than `FEWEST_POINTS` points are left out. Raises ValueError if a
+    Points that are not finite are treated as missing. Of several points of a person at the same time, the first one is
+    used. Segments between gaps with fewer than `FEWEST_POINTS` points are left out. Raises ValueError if a
     column is missing, a line cannot be parsed, or no person has enough points; the message names the file.
     """
-    with open(path, newline='', encoding='utf-8-sig') as stream:
-        reader = csv.DictReader(stream)
-        try:
-            if not set(COLUMNS) <= set(reader.fieldnames or ()):
-                raise ValueError('%s has the columns %s; %s expected'
-                                 % (path, ','.join(reader.fieldnames or ()), ','.join(COLUMNS)))
-            rows = [_row(path, reader.line_num, line) for line in reader]
-        except csv.Error as error:
-            raise ValueError('%s cannot be read as a table (%s)' % (path, error))
+    rows = [tuple(row[name] for name in ('id', 't_s', 'x_m', 'y_m')) for row in read_rows(path, COLUMNS, ('id',))]
     return _sequence(path, os.path.splitext(os.path.basename(path))[0], rows)
-
-
-def _row(path, number, line):
-    try:
-        time_s, x_m, y_m = (float(line[name]) for name in ('t_s', 'x_m', 'y_m'))
-        if not np.isfinite(time_s):
-            raise ValueError
-    except (TypeError, ValueError):
-        values = ','.join(str(line[name]) for name in COLUMNS)
-        raise ValueError('%s, line %d: %s is not a point' % (path, number, values))
-    return line['id'], time_s, x_m, y_m
 
 
 def _sequence(source, name, rows):
     """Sequence of rows (id, time_s, x_m, y_m)."""
     points = {}
     for identity, time_s, x_m, y_m in rows:
-        if np.isfinite(x_m) and np.isfinite(y_m):
+        if np.isfinite([time_s, x_m, y_m]).all():
             points.setdefault(identity, {}).setdefault(time_s, (x_m, y_m))
     people, all_points = [], []
     for identity in sorted(points):

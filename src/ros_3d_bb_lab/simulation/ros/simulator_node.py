@@ -22,8 +22,7 @@ from ros_3d_bb.nodes.common.startup import SENDING_S, read_params, run_node, wai
 from ros_3d_bb_lab.simulation.ros.driven_robot import QUEUE_SIZE, DrivenRobot, robot_transforms
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import TRUTH_TOPIC, boxes_message, simulated_messages
 from ros_3d_bb_lab.simulation.scenario import read_scenario, with_overrides
-from ros_3d_bb_lab.simulation.simulator import STEP_S, Simulator
-from ros_3d_bb_lab.simulation.true_boxes import jittered_boxes
+from ros_3d_bb_lab.simulation.simulator import STEP_S, Simulator, jittered_boxes
 
 CLOCK_LEAD_NS = NS  # from the time published while waiting for subscribers to the first image
 PAUSE_NS = 3 * NS  # between repetitions of a scene; separates the people of successive repetitions
@@ -52,7 +51,6 @@ class SimulatorParams(NamedTuple):
     supervised: bool = Param(
         False, 'Whether another node controls the time, with ~publish_clock: the scene stands still until the first '
         'message on ~time_limit, and its time never exceeds the last one.')
-    speed: float = Param(1.0, 'Speed of the published time; 1: real time.', limits=(0.001, 1000))
     repeat: bool = Param(True, 'Whether the scene starts again 3 s after its end. Otherwise, the node exits.')
     wait_for_subscribers: int = WAIT_FOR_SUBSCRIBERS
 
@@ -182,8 +180,7 @@ class SimulatorNode(object):
         for time_s, number in self._simulator.steps():
             if rospy.is_shutdown():
                 return
-            due_s = began_s + time_s / self._params.speed
-            time.sleep(max(0.0, due_s - time.monotonic()))
+            time.sleep(max(0.0, began_s + time_s - time.monotonic()))
             stamp_ns = start_ns + int(round(time_s * NS))
             while self._limit_ns is not None and stamp_ns > self._limit_ns and not rospy.is_shutdown():
                 time.sleep(LIMIT_POLL_S)
@@ -192,7 +189,7 @@ class SimulatorNode(object):
             if number is not None:
                 self._render(number, state, stamp_ns)
             if self._clock_pub is not None:
-                began_s = max(began_s, time.monotonic() - time_s / self._params.speed - CATCH_UP_S)
+                began_s = max(began_s, time.monotonic() - time_s - CATCH_UP_S)
         self._wait_for_image()
 
     def _publish_state(self, state, stamp_ns):
@@ -239,8 +236,6 @@ def _scenario(params):
                          'those in config/scenarios')
     if params.supervised and not params.publish_clock:
         raise ValueError('parameter ~supervised is true; it needs ~publish_clock')
-    if params.speed != 1 and not params.publish_clock:
-        raise ValueError('parameter ~speed is %g; without ~publish_clock, 1 expected' % params.speed)
     try:
         scenario = read_scenario(params.scenario)
     except OSError as error:
