@@ -138,7 +138,7 @@ def _names(metadata):
         raise ValueError('its names are longer than %d characters' % MAX_METADATA)
     try:
         names = ast.literal_eval(text)  # executes no code
-    except SyntaxError as error:
+    except (SyntaxError, ValueError) as error:
         raise ValueError('its names cannot be read (%s)' % error)
     count = len(names) if isinstance(names, (dict, list, tuple)) else 0
     if not 0 < count <= MAX_CLASSES:
