@@ -2,9 +2,9 @@
 import argparse
 import sys
 
-from ros_3d_bb_annotator.document import Document
-from ros_3d_bb_annotator.export import default_estimator, export
-from ros_3d_bb_annotator.validation import leftovers_of, problems_of
+from ros_3d_bb_annotator.document import ESTIMATOR, Document
+from ros_3d_bb_annotator.export import export
+from ros_3d_bb_annotator.validation import problems_of
 
 
 def main(arguments=None):
@@ -14,11 +14,9 @@ def main(arguments=None):
         return _show(arguments.session)
     try:
         document = Document.open(arguments.session)
-        for note in document.notes:
-            print('annotator: note: %s' % note, file=sys.stderr)
         if arguments.export:
-            print('%s: %d rows' % (arguments.export, export(
-                document, arguments.export, arguments.estimator or default_estimator(document))))
+            count = export(document, arguments.export, arguments.estimator or ESTIMATOR)
+            print('%s: %d rows' % (arguments.export, count))
         elif arguments.analyse:
             _analyse(document, arguments)
         else:
@@ -41,7 +39,7 @@ def _show(folder):
 
 def _analyse(document, arguments):
     from ros_3d_bb_annotator.analysis import analyse  # imports scipy and matplotlib
-    analysed = analyse(document, arguments.out, arguments.estimator)
+    analysed = analyse(document, arguments.out, arguments.estimator or ESTIMATOR)
     for outlier in analysed.outliers:
         print('annotator: left out of the analysis:', outlier, file=sys.stderr)
     print(analysed.text)
@@ -54,10 +52,6 @@ def _validate(document):
     problems = list(problems_of(document))
     for problem in problems:
         print(problem)
-    leftovers = leftovers_of(document)
-    if leftovers:
-        print('annotator: note: no measurement refers to %s; these files may be left from a killed program, and can be '
-              'deleted if no program uses the session' % ', '.join(leftovers), file=sys.stderr)
     done, total = document.progress
     print('%s: %d measurements, %d annotated or rejected, %d problem%s'
           % (document.folder, total, done, len(problems), '' if len(problems) == 1 else 's'))
@@ -66,8 +60,7 @@ def _validate(document):
 
 def _arguments(arguments):
     parser = argparse.ArgumentParser(prog='annotator', description=__doc__)
-    parser.add_argument('session', nargs='?', metavar='SESSION', help="folder of a measurement session; the old "
-                        "format of the thesis is supported")
+    parser.add_argument('session', nargs='?', metavar='SESSION', help='folder of a measurement session')
     actions = parser.add_mutually_exclusive_group()
     actions.add_argument('--export', metavar='FILE.csv', help='write a table with one row per annotated '
                          'person, in millimetres')
@@ -76,8 +69,7 @@ def _arguments(arguments):
                          'there are any')
     parser.add_argument('--out', metavar='DIR', help='output folder of --analyse (default: SESSION/analysis)')
     parser.add_argument('--estimator', choices=('foreground', 'median', 'recorded'), help='positions of --analyse and '
-                        '--export: new estimates, or the recorded ones (default: foreground; recorded for the old '
-                        'format; --export has no median)')
+                        '--export: new estimates, or the recorded ones (default: foreground; --export has no median)')
     parsed = parser.parse_args(arguments)
     if (parsed.export or parsed.analyse or parsed.validate) and not parsed.session:
         parser.error('a SESSION expected')

@@ -4,7 +4,7 @@ from ros_3d_bb_annotator.marks_dialog import MarksDialog
 from ros_3d_bb_annotator.qt import QtWidgets
 
 REASONS = ('', 'not on the mark', 'truncated by the image border', 'occluded', 'nobody found', 'wrong depth')
-ENTER_ALL, PLAUSIBLE_ONLY, ANALYSE = 'enter all', 'plausible only', 'analyse'
+ENTER_ALL = 'enter all'
 MOST_SHOWN = 5
 
 
@@ -26,7 +26,7 @@ def ask_reason(parent, names):
 def ask_implausible(parent, problems, count):
     """Ask about implausible truths: {index: lines of text or Outlier} among `count` measurements.
 
-    Returns ENTER_ALL, PLAUSIBLE_ONLY, the truth (x, y, z) that was intended, or None to correct it.
+    Returns ENTER_ALL, the truth (x, y, z) that was intended, or None to correct it.
     """
     found = [problem for lines in problems.values() for problem in lines]
     box = QtWidgets.QMessageBox(QtWidgets.QMessageBox.Warning, 'Implausible position',
@@ -42,8 +42,6 @@ def ask_implausible(parent, problems, count):
         (x_m, z_m), = intended
         use = box.addButton('&Use %s' % plausible_text((x_m, z_m)), QtWidgets.QMessageBox.AcceptRole)
         answers[use] = x_m, None, z_m
-    if len(problems) < count:
-        answers[box.addButton('Enter the &plausible ones', QtWidgets.QMessageBox.AcceptRole)] = PLAUSIBLE_ONLY
     box.setDefaultButton(correct)
     box.setEscapeButton(correct)
     box.exec_()
@@ -52,35 +50,6 @@ def ask_implausible(parent, problems, count):
 
 def _first_upper(text):
     return text[:1].upper() + text[1:]
-
-
-def ask_outliers(parent, outliers):
-    """Name implausible truths before an analysis. Returns the chosen index, ANALYSE, or None to cancel.
-
-    `outliers` are tuples (index, detection, Outlier).
-    """
-    dialog = QtWidgets.QDialog(parent)
-    dialog.setWindowTitle('Implausible positions')
-    dialog.resize(720, 320)
-    text = QtWidgets.QLabel('<b>%d true position%s implausible.</b> The analysis leaves such measurements out, and '
-                            'lists them in its report.' % (len(outliers), ' is' if len(outliers) == 1 else 's are'))
-    text.setWordWrap(True)
-    rows = QtWidgets.QListWidget()
-    rows.setWordWrap(True)
-    rows.addItems([str(outlier) for _index, _person, outlier in outliers])
-    rows.setCurrentRow(0)
-    buttons, results = QtWidgets.QDialogButtonBox(QtWidgets.QDialogButtonBox.Cancel), []
-    for label, result in (('&Go to it', lambda: outliers[rows.currentRow()][0]),
-                          ('&Analyse without them', lambda: ANALYSE)):
-        button = buttons.addButton(label, QtWidgets.QDialogButtonBox.ActionRole)
-        button.clicked.connect(lambda _checked, result=result: (results.append(result()), dialog.accept()))
-    rows.itemActivated.connect(lambda _item: (results.append(outliers[rows.currentRow()][0]), dialog.accept()))
-    buttons.rejected.connect(dialog.reject)
-    layout = QtWidgets.QVBoxLayout(dialog)
-    for widget in (text, rows, buttons):
-        layout.addWidget(widget)
-    dialog.exec_()
-    return results[0] if results else None
 
 
 def ask_marks(parent, marks):

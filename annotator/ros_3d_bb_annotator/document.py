@@ -4,7 +4,6 @@ Positions are in the camera's optical frame, in metres. Only the edited fields o
 can add measurements to the same session concurrently.
 """
 import contextlib
-import copy
 import os
 
 import numpy as np
@@ -15,7 +14,6 @@ from ros_3d_bb.estimation.box3d import plausible
 from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named
 from ros_3d_bb.sessions.session_reader import (Session, SessionError, camera_of, boxes_of_others, read_color,
                                                read_depth, read_description, session_errors)
-from ros_3d_bb_annotator import legacy
 from ros_3d_bb_annotator.entries import (Edit, changed, detections_of, drawn, entry_at, grid_of, mark_entry,
                                          truth_entry, with_detections, with_person)
 from ros_3d_bb_annotator.estimates import Estimates
@@ -29,20 +27,15 @@ class Document(object):
 
     `measurements` are EditedMeasurements in the order of the file; an index remains valid while the document is open.
     `progress` is (number of annotated or rejected measurements, number of all). `grid` are the Marks on the floor.
-    `is_old_format` is whether the session has the format of the thesis, without `camera` (None) and usable depth.
-    `notes` are messages to the user on data that cannot be recovered. `estimates` are the positions that the noise
-    analysis uses; those stored in the session are the recorded ones.
+    `estimates` are the positions that the noise analysis uses; those stored in the session are the recorded ones.
     """
 
     def __init__(self, folder, content):
         self.folder, self.measurements = folder, ()
-        self.is_old_format = content.get('form') == legacy.FORM
-        self.notes = legacy.NOTES if self.is_old_format else ()
-        self._session = Session(*(None, None, '') if self.is_old_format else camera_of(content), frames=())
+        self._session = Session(*camera_of(content), frames=())
         self.camera = self._session.camera
         self._content, self._signature = {'frames': []}, None
         self._undo, self._redo, self._annotated = [], [], []
-        self._drafts = {}  # fields by the ID of the measurement
         self.estimates = Estimates(self)
         self._update(content)
 
@@ -50,7 +43,7 @@ class Document(object):
     def open(cls, folder):
         """Open the session in a folder, without reading images. Raises SessionError if it cannot be opened."""
         folder = os.path.abspath(str(folder))
-        content = legacy.read(folder) if legacy.is_old_format(folder) else read_description(folder)
+        content = read_description(folder)
         with session_errors(os.path.join(folder, FILE_NAME)):
             return cls(folder, content)
 
@@ -72,25 +65,19 @@ class Document(object):
 
     def depth(self, index):
         """Read the depth image of a measurement, see `read_depth`."""
-        if self.is_old_format:
-            raise SessionError(legacy.NOTES[0])
         return read_depth(self._usable(index), self._session)
-
-    def stretched_depth(self, index):
-        """Read the unitless depth image of a measurement in the old format, see `legacy.read_stretched`."""
-        return legacy.read_stretched(self._usable(index).depth_path)
 
     def positions(self, index, depth=None):
         """Yield the estimated position (3,) of each detection, or None; see `Estimates`. Reads depth if not given."""
         detections = self.measurements[index].detections
         with contextlib.suppress(ValueError):
-            depth = depth if self.is_old_format or depth is not None else self.depth(index)
+            depth = self.depth(index) if depth is None else depth
         for detection in detections:
             box = None
             if depth is not None and detection.box_px is not None:
                 with contextlib.suppress(ValueError):  # an empty box
                     box = self.estimated(index, detection.box_px, depth)
-            yield detection.estimate_m if self.is_old_format else None if box is None else box.center_m
+            yield None if box is None else box.center_m
 
     def estimated(self, index, box_px, depth=None):
         """Estimate the Box3D of a 2D box (x1, y1, x2, y2) in a measurement, considering the boxes of other people.
@@ -158,14 +145,11 @@ class Document(object):
             raise ValueError('truth z is %g m; more than 0 expected, as the camera looks along z' % z_m)
         truth_mm = truth_entry(x_m, z_m, y_m)
         self._edit(*((index, self._changes_with_truth(index, truth_mm)) for index in indices))
-        for index in indices:
-            self._annotated.append(index)
-            self.set_draft(index, {})
+        self._annotated.extend(indices)
 
     def clear_truth(self, index):
         """Remove the truth of the selected person."""
         self._edit((index, {'truth_mm': None}))
-        self.set_draft(index, {})
 
     def last_truth(self, index):
         """Truth (x, y, z) of the last annotated measurement, or else of the nearest one before `index`."""
@@ -224,8 +208,6 @@ class Document(object):
         if not reason.strip():
             raise ValueError('a reason is needed to reject a measurement')
         self._edit(*((index, {'rejected': reason.strip()}) for index in indices))
-        for index in indices:
-            self.set_draft(index, {})
 
     def restore(self, index):
         self._edit((index, {'rejected': None}))
@@ -249,17 +231,8 @@ class Document(object):
         """Redo the last undone edit. Returns the same as `undo`."""
         return self._step(self._redo, self._undo)
 
-    def draft(self, index):
-        """Draft of a measurement, the text that was typed but not entered: {name of a field: text}."""
-        return self._drafts.get(self.measurements[index].id, {})
-
-    def set_draft(self, index, fields):
-        self._drafts[self.measurements[index].id] = {name: text for name, text in fields.items() if text}
-
     def _drawn(self, index, box_px):
         """Clip a box to the image. Returns it and its estimate."""
-        if self.camera is None:
-            raise SessionError(legacy.NOTES[0])
         x1, y1, x2, y2 = (int(round(edge)) for edge in box_px)
         box_px = max(x1, 0), max(y1, 0), min(x2, self.camera.width), min(y2, self.camera.height)
         return box_px, self.estimated(index, box_px)
@@ -304,8 +277,6 @@ class Document(object):
         """Write edits together. Returns their inverses."""
         try:
             with locked_update(self.folder) as content:
-                if self.is_old_format and 'form' not in content:
-                    content.update(copy.deepcopy(self._content))
                 inverses = [changed(content if edit.index is None else entry_at(content['frames'], edit), edit)
                             for edit in edits]
         except (OSError, ValueError) as error:

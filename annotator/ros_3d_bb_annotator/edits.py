@@ -45,6 +45,7 @@ class Edits(object):
 
     def clear_truth(self):
         """Remove the truth of the selected person."""
+        self._window.pane.truth.forget_typed()
         self._edit(Document.clear_truth)
         self._window.pane.truth.begin()
 
@@ -112,8 +113,7 @@ class Edits(object):
                 return
             if isinstance(answer, tuple):
                 truth_m = answer
-            elif answer == dialogs.PLAUSIBLE_ONLY:
-                indices = [index for index in indices if index not in problems]
+        self._window.pane.truth.forget_typed()
         x_m, y_m, z_m = truth_m
         self._enter(lambda document: document.set_truths(indices, x_m, z_m, y_m),
                     '%d measurements' % len(indices) if len(indices) > 1 else '')
@@ -124,8 +124,7 @@ class Edits(object):
         if self._edit(lambda document, _index: edit(document)):
             window.last_entry.setText('<b>%s</b>: %s' % (
                 window.measurement.id, text or error_text(window.document.errors(index))))
-            if window.actions['go_on'].isChecked():
-                window.next_new()
+            window.next_new()
 
     def _edit(self, edit, *values):
         """Apply a method of Document to the current measurement, and show it. Returns whether it succeeded."""
@@ -149,8 +148,7 @@ class Edits(object):
             self._window.show_measurement(index)
 
     def _succeeds(self, edit):
-        """Save the typed text, and apply an edit. Returns whether it succeeded."""
-        self._window.keep_typed()
+        """Apply an edit. Returns whether it succeeded."""
         try:
             edit()
             return True

@@ -7,7 +7,7 @@ MANY = 500  # measurements, of which a single one has no influence on the likely
 
 
 class Estimates(object):
-    """Estimates of the boxes of a document from its depth images; in the old format, the recorded positions.
+    """Estimates of the boxes of a document from its depth images.
 
     They are computed once for the boxes of a measurement. `known`, `outlier` and `implausible` use what has been
     computed.
@@ -15,11 +15,6 @@ class Estimates(object):
 
     def __init__(self, document):
         self._document, self._known = document, {}
-        self.update()
-
-    def clear(self):
-        """Forget all estimates, because images have changed."""
-        self._known.clear()
         self.update()
 
     def update(self):

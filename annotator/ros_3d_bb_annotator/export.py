@@ -9,18 +9,12 @@ import os
 from ros_3d_bb.core.atomic_file import atomic_write
 from ros_3d_bb.estimation.error_model import RECORDED
 from ros_3d_bb.sessions.session_reader import SessionError
-from ros_3d_bb_annotator.document import ESTIMATOR
 from ros_3d_bb_annotator.measurement import ANNOTATED
 
 AXES = 'XYZ'
 COLUMNS = (('id', 'label', 'stamp', 'x1', 'y1', 'x2', 'y2', 'estimator')
            + tuple('%s %s' % (axis, kind) for kind in ('measured', 'recorded', 'true', 'error') for axis in AXES)
            + ('implausible',))
-
-
-def default_estimator(document):
-    """Estimator of the noise analysis; 'recorded' for the old format, which has no depth."""
-    return RECORDED if document.is_old_format else ESTIMATOR
 
 
 def rows_of(document, estimator):

@@ -1,5 +1,4 @@
 """Top view of the floor in front of the camera with its marks (thesis Fig. 5.1). A click on a mark sets the truth."""
-import itertools
 import math
 from typing import Any, NamedTuple, Optional, Tuple
 
@@ -11,9 +10,8 @@ GROUND, LINES, CAMERA, TEXT = (QtGui.QColor(*color) for color in (
 SIGHT, MARK, POINTED = QtGui.QColor(60, 120, 200, 22), QtGui.QColor(150, 150, 150), QtGui.QColor(0, 114, 178)
 TRUTH, ESTIMATE = QtGui.QColor(0, 90, 170), QtGui.QColor(213, 94, 0)
 MARGIN_PX, REACH_PX = 22, 16
-MARK_PX, NAME_PX = (4, 8), (9, 13)  # minimum and maximum: radius of a mark, height of its name
+MARK_PX, NAME_PX = 5, 11  # radius of a mark, height of its name
 STEPS_M = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-ARROWS = {Qt.Key_Left: (-1, 0), Qt.Key_Right: (1, 0), Qt.Key_Up: (0, 1), Qt.Key_Down: (0, -1)}
 
 
 class FloorScene(NamedTuple):
@@ -29,10 +27,7 @@ EMPTY = FloorScene((), None, None, (0.0, 0.0))
 
 
 class GridView(QtWidgets.QWidget):
-    """Top view of the floor. `mark_chosen` is emitted with a Mark that is selected by mouse or keyboard.
-
-    Arrow keys move between marks; Enter and Space select a mark.
-    """
+    """Top view of the floor. `mark_chosen` is emitted with a Mark that is clicked."""
 
     mark_chosen = Signal(object)
 
@@ -40,7 +35,6 @@ class GridView(QtWidgets.QWidget):
         super(GridView, self).__init__(parent)
         self._scene, self._pointed = EMPTY, None
         self.setMouseTracking(True)
-        self.setFocusPolicy(Qt.StrongFocus)
         self.setMinimumSize(160, 160)
         self.setAccessibleName('floor from above')
 
@@ -60,13 +54,6 @@ class GridView(QtWidgets.QWidget):
         return QtCore.QPointF(self.width() / 2 + (x_m - (left_m + right_m) / 2) * scale,
                               self.height() - MARGIN_PX - z_m * scale)
 
-    def _apart_px(self):
-        """Minimum distance between marks on the screen; 1000 if there are fewer than two marks."""
-        places = [self.place_of(mark.x_m, mark.z_m) for mark in self._scene.marks]
-        apart_px = [math.hypot(one.x() - other.x(), one.y() - other.y())
-                    for one, other in itertools.combinations(places, 2) if one != other]
-        return min(apart_px, default=1000.0)
-
     def _extent(self):
         """Left, right and far limit of the visible floor in metres, with a margin around its content."""
         points = [(mark.x_m, mark.z_m) for mark in self._scene.marks]
@@ -79,23 +66,20 @@ class GridView(QtWidgets.QWidget):
         painter.setRenderHint(QtGui.QPainter.Antialiasing)
         painter.fillRect(self.rect(), GROUND)
         self._paint_floor(painter)
-        apart_px = self._apart_px()
         for mark in self._scene.marks:
-            self._paint_mark(painter, mark, apart_px)
+            self._paint_mark(painter, mark)
         self._paint_error(painter)
         self._paint_legend(painter)
         if not self._scene.marks:
             painter.setPen(TEXT)
             painter.drawText(self.rect().adjusted(70, 6, -12, -6), Qt.AlignLeft | Qt.AlignTop | Qt.TextWordWrap,
                              'No floor marks yet: Edit, Floor marks (Ctrl+G).')
-        if self.hasFocus():
-            painter.setPen(QtGui.QPen(POINTED, 2))
-            painter.setBrush(Qt.NoBrush)
-            painter.drawRect(self.rect().adjusted(1, 1, -1, -1))
 
     def _paint_floor(self, painter):
         left_m, right_m, far_m = self._extent()
-        _set_height(painter, NAME_PX[1])
+        font = painter.font()
+        font.setPixelSize(NAME_PX)
+        painter.setFont(font)
         far_m *= 1.5  # lines extend beyond the farthest mark
         step_m = next((step for step in STEPS_M if max(right_m - left_m, far_m) / step <= 9), STEPS_M[-1])
         painter.setPen(LINES)
@@ -115,16 +99,15 @@ class GridView(QtWidgets.QWidget):
         painter.setBrush(CAMERA)
         painter.drawRoundedRect(QtCore.QRectF(camera.x() - 20, camera.y() - 4, 40, 11), 5, 5)
 
-    def _paint_mark(self, painter, mark, apart_px):
+    def _paint_mark(self, painter, mark):
         place, pointed = self.place_of(mark.x_m, mark.z_m), mark == self._pointed
-        radius = min(max(0.2 * apart_px, MARK_PX[0]), MARK_PX[1])
-        height = int(min(max(0.4 * apart_px, NAME_PX[0]), NAME_PX[1]))
+        radius = MARK_PX + 3 * pointed
         painter.setPen(QtGui.QPen(POINTED, 3) if pointed else QtGui.QPen(MARK.darker(130), 1))
         painter.setBrush(MARK)
-        painter.drawEllipse(place, radius + 3 * pointed, radius + 3 * pointed)
-        _set_height(painter, height)
+        painter.drawEllipse(place, radius, radius)
         painter.setPen(TEXT)
-        painter.drawText(QtCore.QRectF(place.x() - 60, place.y() + radius, 120, height + 3), Qt.AlignHCenter, mark.name)
+        painter.drawText(QtCore.QRectF(place.x() - 60, place.y() + MARK_PX, 120, NAME_PX + 3), Qt.AlignHCenter,
+                         mark.name)
 
     def _paint_error(self, painter):
         """The truth as a blue cross, the estimate as an orange circle, a line between them."""
@@ -143,7 +126,6 @@ class GridView(QtWidgets.QWidget):
             painter.drawEllipse(estimate, 6, 6)
 
     def _paint_legend(self, painter):
-        _set_height(painter, NAME_PX[1])
         for row, (color, text) in enumerate(((TRUTH, '✕ true'), (ESTIMATE, '○ estimate'))):
             painter.setPen(color)
             painter.drawText(QtCore.QPointF(self.width() - 80, self.height() - 24 + 16 * row), text)
@@ -152,21 +134,12 @@ class GridView(QtWidgets.QWidget):
         self._point_at(self._mark_at(event.localPos()))
 
     def leaveEvent(self, _event):  # noqa: N802
-        if not self.hasFocus():
-            self._point_at(None)
+        self._point_at(None)
 
     def mousePressEvent(self, event):  # noqa: N802
         mark = self._mark_at(event.localPos())
         if event.button() == Qt.LeftButton and mark is not None:
             self.mark_chosen.emit(mark)
-
-    def keyPressEvent(self, event):  # noqa: N802
-        if event.key() in ARROWS and self._scene.marks:
-            self._point_at(self._next_mark(ARROWS[event.key()]))
-        elif event.key() in (Qt.Key_Return, Qt.Key_Enter, Qt.Key_Space) and self._pointed is not None:
-            self.mark_chosen.emit(self._pointed)
-        else:
-            event.ignore()
 
     def _point_at(self, mark):
         self._pointed = mark
@@ -178,21 +151,3 @@ class GridView(QtWidgets.QWidget):
         def distance_px(mark):
             return (self.place_of(mark.x_m, mark.z_m) - position).manhattanLength()
         return min((mark for mark in self._scene.marks if distance_px(mark) <= REACH_PX), key=distance_px, default=None)
-
-    def _next_mark(self, way):
-        """Next mark in the direction of an arrow key (right, ahead). Lateral distance counts three times."""
-        if self._pointed is None:
-            return min(self._scene.marks, key=lambda mark: (mark.z_m, abs(mark.x_m)))
-        least_m, best = float('inf'), self._pointed
-        for mark in self._scene.marks:
-            x_m, z_m = mark.x_m - self._pointed.x_m, mark.z_m - self._pointed.z_m
-            ahead_m, aside_m = x_m * way[0] + z_m * way[1], abs(x_m * way[1]) + abs(z_m * way[0])
-            if ahead_m > 1e-6 and ahead_m + 3 * aside_m < least_m:
-                least_m, best = ahead_m + 3 * aside_m, mark
-        return best
-
-
-def _set_height(painter, height_px):
-    font = painter.font()
-    font.setPixelSize(height_px)
-    painter.setFont(font)

@@ -4,19 +4,15 @@ from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets, Signal
 
 BACKGROUND = QtGui.QColor(38, 40, 44)
 WHEEL_STEP = 1.2
-CURSOR_STEP_PX, PAN_STEP_PX = 10, 40
 CLICK_PX, GRAB_PX = 4, 6  # maximum movement of a click, and distance from an edge, on the screen
-ALL_EDGES, LOWER_RIGHT = (0, 1, 2, 3), (2, 3)
-ARROWS = {Qt.Key_Left: (-1, 0), Qt.Key_Right: (1, 0), Qt.Key_Up: (0, -1), Qt.Key_Down: (0, 1)}
+ALL_EDGES = (0, 1, 2, 3)
 
 
 class ImageView(QtWidgets.QWidget):
     """View of one image. If `image` is None, `message` is the reason. `box_chosen` is emitted with the index of a box.
 
-    Wheel: zoom; drag: pan; click: select a box; Shift and drag, or drag while drawing: draw a box; drag an edge of the
-    selected box: resize it; Ctrl and drag: move it. Arrow keys move the cursor by 10 pixels (Ctrl: 1), Shift and arrow
-    keys pan, Space sets the corners of a box, Escape cancels it. While a box is edited, arrow keys move it, or with
-    Shift its lower right corner.
+    Wheel: zoom; drag: pan; click: select a box; Shift and drag: draw a box; drag an edge of the selected box: resize
+    it; Ctrl and drag: move it.
     """
 
     box_chosen = Signal(int)
@@ -24,10 +20,10 @@ class ImageView(QtWidgets.QWidget):
     def __init__(self, name, shared, parent=None):
         super(ImageView, self).__init__(parent)
         self._name, self._shared = name, shared
-        self.image, self.message, self._scene, self._legend = None, '', marking.NOTHING, None
+        self.image, self.message, self._scene = None, '', marking.NOTHING
         self._pressed_at, self._panned_from, self._grabbed = None, None, ()
         self.setMouseTracking(True)
-        self.setFocusPolicy(Qt.StrongFocus)
+        self.setFocusPolicy(Qt.ClickFocus)
         self.setMinimumSize(240, 180)
         self.setAccessibleName('%s image' % name)
         shared.changed.connect(self.update)
@@ -38,15 +34,6 @@ class ImageView(QtWidgets.QWidget):
     def show_image(self, image, scene, message=''):
         """Show a QImage with overlay (`marking.Scene`), or a message."""
         self.image, self.message, self._scene = image, message, scene
-        self.update()
-
-    def show_legend(self, legend):
-        """Show a colour scale (QImage, text above, text below), or none."""
-        self._legend = legend
-        self.update()
-
-    def show_scene(self, scene):
-        self._scene = scene
         self.update()
 
     def to_image(self, position):
@@ -75,7 +62,7 @@ class ImageView(QtWidgets.QWidget):
             painter.resetTransform()
             marking.paint_scene(painter, transform, self._scene)
             marking.paint_cursor(painter, transform, self._shared)
-        marking.paint_frame(painter, self.rect(), self._name, self._legend, self.hasFocus())
+        marking.paint_caption(painter, self.rect(), self._name)
 
     def wheelEvent(self, event):  # noqa: N802
         factor = WHEEL_STEP ** (event.angleDelta().y() / 120.0)
@@ -86,14 +73,13 @@ class ImageView(QtWidgets.QWidget):
         if event.button() != Qt.LeftButton or self.image is None:
             return
         self._pressed_at = self._panned_from = event.localPos()
-        self._grabbed = () if self._shared.drawing else self._edges_at(event)
+        self._grabbed = self._edges_at(event)
         if self._grabbed:
             self._shared.start_editing(self._scene.person_box().rect_px)
-        elif self._shared.drawing or event.modifiers() & Qt.ShiftModifier:
+        elif event.modifiers() & Qt.ShiftModifier:
             self._panned_from = None
             self._point_near(event)
-            self._shared.corner = None
-            self._shared.set_corner()
+            self._shared.start_drawing()
 
     def mouseMoveEvent(self, event):  # noqa: N802
         if self._pressed_at is not None and self._grabbed:
@@ -118,12 +104,12 @@ class ImageView(QtWidgets.QWidget):
         was_grabbed, self._grabbed = bool(self._grabbed), ()
         self._pressed_at = self._panned_from = None
         if was_grabbed and not clicked:
-            self._shared.finish_editing()
+            self._shared.finish()
         elif was_grabbed:
             self._shared.cancel()
         elif self._shared.corner is not None:
             self._point_near(event)
-            self._shared.set_corner()
+            self._shared.finish()
         elif clicked:
             number = self._scene.box_at(*self.to_image(event.localPos()))
             if number is not None:
@@ -132,34 +118,6 @@ class ImageView(QtWidgets.QWidget):
     def leaveEvent(self, _event):  # noqa: N802
         if self._shared.corner is None:
             self._shared.point_at(-1, -1)
-
-    def keyPressEvent(self, event):  # noqa: N802
-        key, modifiers = event.key(), event.modifiers()
-        if self.image is None:
-            event.ignore()
-        elif self._shared.edited is not None:
-            self._edit_by_key(key, modifiers)
-        elif key in ARROWS and modifiers & Qt.ShiftModifier:
-            self._shared.pan_by(*(PAN_STEP_PX / self._shared.zoom * way for way in ARROWS[key]))
-        elif key in ARROWS:
-            step = 1 if modifiers & Qt.ControlModifier else CURSOR_STEP_PX
-            self._shared.step(*(step * way for way in ARROWS[key]))
-        elif key == Qt.Key_Space or (key in (Qt.Key_Return, Qt.Key_Enter) and self._shared.corner is not None):
-            self._shared.set_corner()
-        elif key == Qt.Key_Escape and (self._shared.drawing or self._shared.corner is not None):
-            self._shared.cancel()
-        else:
-            event.ignore()
-
-    def _edit_by_key(self, key, modifiers):
-        if key in ARROWS:
-            step = 1 if modifiers & Qt.ControlModifier else CURSOR_STEP_PX
-            self._shared.nudge(LOWER_RIGHT if modifiers & Qt.ShiftModifier else ALL_EDGES,
-                               *(step * way for way in ARROWS[key]))
-        elif key in (Qt.Key_Return, Qt.Key_Enter, Qt.Key_Space):
-            self._shared.finish_editing()
-        elif key == Qt.Key_Escape:
-            self._shared.cancel()
 
     def _edges_at(self, event):
         """Edges (0 to 3) of the selected box at the mouse; with Ctrl all of them inside the box; () elsewhere."""

@@ -4,7 +4,7 @@ import signal
 import sys
 
 from ros_3d_bb_annotator import dialogs
-from ros_3d_bb_annotator.actions import build_menus, keys_dialog
+from ros_3d_bb_annotator.actions import build_menus
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.edits import Edits
 from ros_3d_bb_annotator.measurement_list import MeasurementList
@@ -13,7 +13,7 @@ from ros_3d_bb_annotator.qt import Qt, QtCore, QtWidgets
 from ros_3d_bb_annotator.results import Results
 
 TITLE = 'ros_3d_bb annotator'
-REFRESH_MS, WAKE_MS = 2000, 250
+REFRESH_MS = 2000
 SHOW_ESTIMATES_EVERY = 100
 
 
@@ -29,8 +29,6 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self.actions = build_menus(self)
         self._lay_out()
         self._connect()
-        self._ahead = QtCore.QTimer(self, singleShot=True, interval=0)
-        self._ahead.timeout.connect(self._read_ahead)
         self._estimate = QtCore.QTimer(self, interval=0)
         self._estimate.timeout.connect(self._estimate_next)
         self._refresh = QtCore.QTimer(self, interval=REFRESH_MS)
@@ -61,7 +59,6 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
 
     def open_session(self, folder):
         """Open the session in a folder, or show an error message. Returns whether it is open."""
-        self.keep_typed()
         try:
             document = Document.open(folder)
         except (ValueError, OSError) as error:
@@ -80,16 +77,6 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self._refresh.start()
         return True
 
-    def reload(self):
-        """Read changes of the session by other programs, and reload the images."""
-        self.pane.read_again()
-        self._refresh.start()
-        self._refresh_document()
-        self._start_estimates()
-        if self.current is not None:
-            self.keep_typed()
-            self.show_measurement(self.current)
-
     def _refresh_document(self):
         """Show changes of the session by other programs."""
         before = self.measurement
@@ -97,7 +84,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
             if not self.document.refresh():
                 return
         except (ValueError, OSError) as error:
-            self._refresh.stop()  # one message instead of one every two seconds; reload restarts it
+            self._refresh.stop()  # one message instead of one every two seconds
             dialogs.show_error(self, 'The session has changed and cannot be read', error)
             return
         count = len(self.document.measurements)
@@ -108,29 +95,19 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
             self.show_measurement(self._next_of(-1, self._is_to_do) or 0 if self.current is None else self.current)
 
     def show_measurement(self, number):
-        """Show a measurement. The text typed for the previous one is saved."""
-        changed = number != self.current
-        if changed:
-            self.keep_typed()
-        self.current = number
+        """Show a measurement."""
+        changed, self.current = number != self.current, number
         self.pane.show_measurement(number)
         if changed and self.pane.truth.has_keyboard():
             self.pane.truth.begin()
         self.list.mark_current(number)
         self._show_state()
-        self._ahead.start()
 
     def next(self):
         self._go_to(self.current + 1)
 
     def previous(self):
         self._go_to(self.current - 1)
-
-    def first(self):
-        self._go_to(0)
-
-    def last(self):
-        self._go_to(len(self.document.measurements) - 1)
 
     def next_new(self):
         """Show the next measurement that is neither annotated nor rejected."""
@@ -140,38 +117,8 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         """Show the next measurement with an implausible truth."""
         self._go_to_next(self.document.is_implausible, 'No implausible positions')
 
-    def go_to_search(self):
-        self.list.search.setFocus()
-
-    def go_to_list(self):
-        self.list.table.setFocus()
-
-    def go_to_image(self):
-        self.pane.color_view.setFocus()
-
     def go_to_truth(self):
         self.pane.truth.begin()
-
-    def go_to_floor(self):
-        self.pane.floor.setFocus()
-
-    def start_drawing(self):
-        """Start to draw a box by dragging or by cursor and Space, or stop it."""
-        self.pane.shared.start_drawing(not self.pane.shared.drawing)
-        self.pane.color_view.setFocus()
-
-    def edit_box(self):
-        """Start to move or resize the selected box by the keyboard."""
-        if not self.pane.edit_box():
-            self.statusBar().showMessage('There is no box; D draws one')
-
-    def show_keys(self):
-        keys_dialog(self).exec_()
-
-    def keep_typed(self):
-        """Save the text that was typed for the current measurement."""
-        if self.current is not None:
-            self.pane.truth.flush()
 
     def after_edit(self):
         """Update the window from the document."""
@@ -180,7 +127,6 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self._start_estimates()
 
     def closeEvent(self, event):  # noqa: N802 (Qt's name)
-        self.keep_typed()
         self._refresh.stop()
         self._estimate.stop()
         self.results.wait()
@@ -222,21 +168,6 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         if self._computed and (index is None or self._computed % SHOW_ESTIMATES_EVERY == 0):
             self.list.update_rows()
 
-    def _read_ahead(self):
-        """Read the images of neighbouring measurements, one measurement per idle event."""
-        for step in (1, -1):
-            number = self.current + step
-            if 0 <= number < len(self.document.measurements) and self.pane.read_ahead(number):
-                self._ahead.start()
-                return
-
-    def _on_drawing(self, drawing):
-        self.statusBar().showMessage('Drag a box around the person, or move the cursor with the arrows and set two '
-                                     'corners with Space; Esc cancels' if drawing else '')
-
-    def _keep_draft(self, texts):
-        self.document.set_draft(self.current, texts)
-
     def _show_state(self):
         done, count = self.document.progress if self.document is not None else (0, 0)
         self.progress.setRange(0, max(count, 1))
@@ -247,13 +178,11 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self.actions['redo'].setEnabled(bool(self.document and self.document.can_redo))
         self.actions['clear_truth'].setEnabled(measurement is not None and measurement.truth_m is not None)
         self.actions['enter_for_label'].setEnabled(measurement is not None and bool(measurement.label))
-        for name in ('edit_box', 'delete_box'):
-            self.actions[name].setEnabled(measurement is not None and measurement.person is not None)
+        self.actions['delete_box'].setEnabled(measurement is not None and measurement.person is not None)
         self.actions['restore'].setEnabled(measurement is not None and measurement.rejected is not None)
-        for name in ('same_as_last', 'ask_reject', 'start_drawing', 'next', 'previous', 'next_new', 'next_implausible',
-                     'first', 'last', 'go_to_search'):
+        for name in ('same_as_last', 'ask_reject', 'next', 'previous', 'next_new', 'next_implausible'):
             self.actions[name].setEnabled(measurement is not None)
-        for name in ('ask_export', 'analyse', 'edit_marks', 'reload'):
+        for name in ('ask_export', 'analyse', 'edit_marks'):
             self.actions[name].setEnabled(self.document is not None)
         self.pane.set_usable(measurement is not None)
 
@@ -264,14 +193,13 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         split.addWidget(self.list)
         split.addWidget(self.pane)
         split.setStretchFactor(1, 1)
-        split.setSizes([self.width() * 28 // 100, self.width() * 72 // 100])
+        split.setSizes([self.width() * 31 // 100, self.width() * 69 // 100])
         self.setCentralWidget(split)
-        self.split = split
-        for place, name in enumerate(('same_as_last', 'enter_for_label', 'start_drawing', 'ask_reject')):
+        for name in ('same_as_last', 'enter_for_label', 'ask_reject'):
             button = QtWidgets.QToolButton()
             button.setDefaultAction(self.actions[name])
             button.setSizePolicy(QtWidgets.QSizePolicy.Expanding, QtWidgets.QSizePolicy.Fixed)
-            self.pane.buttons.addWidget(button, place // 2, place % 2)
+            self.pane.buttons.addWidget(button)
         self.progress.setFixedWidth(160)
         self.statusBar().addPermanentWidget(self.last_entry)
         self.statusBar().addPermanentWidget(self.progress)
@@ -281,11 +209,8 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self.pane.person_chosen.connect(self.edits.choose_person)
         self.pane.shared.box_drawn.connect(self.edits.add_box)
         self.pane.shared.box_edited.connect(self.edits.replace_box)
-        self.pane.shared.drawing_changed.connect(self._on_drawing)
         self.pane.truth.entered.connect(self.edits.enter_truth)
-        self.pane.truth.typed.connect(self._keep_draft)
         self.pane.floor.mark_chosen.connect(lambda mark: self.edits.enter_truth(mark.x_m, mark.z_m))
-        self.actions['show_samples'].toggled.connect(self.pane.show_samples)
 
 
 def make_application():
@@ -298,23 +223,9 @@ def make_application():
 def run_window(folder=None):
     """Show the window, optionally with the session in `folder`, until it is closed. Returns the exit status."""
     application = make_application()
-    signal.signal(signal.SIGINT, lambda _number, _frame: application.closeAllWindows())
-    wake = QtCore.QTimer(interval=WAKE_MS)  # Python handles signals only while it executes bytecode
-    wake.timeout.connect(lambda: None)
-    wake.start()
-    window, settings = AnnotatorWindow(), QtCore.QSettings('ros_3d_bb', 'annotator')
-    _restore_layout(window, settings)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # entries are already saved
+    window = AnnotatorWindow()
     window.show()
     if folder is not None:
         QtCore.QTimer.singleShot(0, lambda: window.open_session(folder))
-    status = application.exec_()
-    settings.setValue('geometry', window.saveGeometry())
-    settings.setValue('split', window.split.saveState())
-    return status
-
-
-def _restore_layout(window, settings):
-    """Restore size and division of the window as it was closed."""
-    for name, restore in (('geometry', window.restoreGeometry), ('split', window.split.restoreState)):
-        if settings.value(name) is not None:
-            restore(settings.value(name))
+    return application.exec_()

@@ -62,28 +62,16 @@ def paint_cursor(painter, transform, shared):
     if shared.cursor is None:
         return
     point = transform.map(QtCore.QPointF(shared.cursor[0] + 0.5, shared.cursor[1] + 0.5))
-    arm = 3000 if shared.drawing or band is not None else 12
+    arm = 12 if band is None else 3000
     for color, width in ((QtGui.QColor(0, 0, 0, 160), 3), (DRAWN if arm > 12 else Qt.white, 1)):
         painter.setPen(QtGui.QPen(color, width))
         painter.drawLine(point - QtCore.QPointF(arm, 0), point + QtCore.QPointF(arm, 0))
         painter.drawLine(point - QtCore.QPointF(0, arm), point + QtCore.QPointF(0, arm))
 
 
-def paint_frame(painter, rect, name, legend, focused):
-    """Paint the name of the view, its colour scale, and a frame if it has the keyboard focus."""
-    _paint_label(painter, QtCore.QPointF(rect.left(), rect.bottom() + 1), name, CAPTION)  # labels of boxes are on top
-    if legend is not None:
-        scale, top, bottom = legend
-        bar = QtCore.QRect(rect.right() - 22, rect.top() + 28, 14, max(60, rect.height() - 64))
-        painter.drawImage(bar, scale)
-        painter.setPen(QtGui.QPen(Qt.white, 1))
-        painter.drawRect(bar)
-        for text, y in ((top, bar.top() - 22), (bottom, bar.bottom() + 2)):
-            _paint_label(painter, QtCore.QPointF(rect.right() - 8, y), text, CAPTION, inside=True, ends=True)
-    if focused:
-        painter.setPen(QtGui.QPen(DRAWN, 2))
-        painter.setBrush(Qt.NoBrush)
-        painter.drawRect(rect.adjusted(1, 1, -1, -1))
+def paint_caption(painter, rect, name):
+    """Paint the name of the view at the bottom, because labels of boxes are at the top."""
+    _paint_label(painter, QtCore.QPointF(rect.left(), rect.bottom() + 1), name, CAPTION)
 
 
 def paint_message(painter, rect, message):
@@ -120,14 +108,13 @@ def _paint_box(painter, transform, box_px, color, stroke):
         painter.drawRect(transform.mapRect(QtCore.QRectF(x1, y1, x2 - x1, y2 - y1)))
 
 
-def _paint_label(painter, corner, text, color, inside=False, ends=False):
-    """Paint text on a background above its left corner. `inside`: below the corner, `ends`: to the left of it."""
+def _paint_label(painter, corner, text, color):
+    """Paint text on a background above its left corner."""
     if not text:
         return
     metrics = painter.fontMetrics()
     width, height = metrics.boundingRect(text).width() + 10, metrics.height() + 2
-    top = corner.y() if inside else max(corner.y() - height, 0)
-    rect = QtCore.QRectF(corner.x() - (width if ends else 0), top, width, height)
+    rect = QtCore.QRectF(corner.x(), max(corner.y() - height, 0), width, height)
     painter.fillRect(rect, color)
     painter.setPen(Qt.white if color is CAPTION else Qt.black)
     painter.drawText(rect, Qt.AlignCenter, text)

@@ -5,9 +5,6 @@ from typing import NamedTuple, Optional, Tuple
 from ros_3d_bb.sessions.session_reader import RecordedDetection, SessionError, frame_of, session_errors
 
 NEW, ANNOTATED, REJECTED, NOBODY = 'new', 'annotated', 'rejected', 'nobody found'
-STATES = NEW, NOBODY, ANNOTATED, REJECTED
-# Field of the stretched depth of the old format. Its name differs from that of depth in metric units.
-STRETCHED_DEPTH = 'stretched_depth'
 
 
 class Mark(NamedTuple):
@@ -39,7 +36,7 @@ class EditedMeasurement(NamedTuple):
 
     @property
     def state(self):
-        """One of STATES."""
+        """NEW, ANNOTATED, REJECTED or NOBODY."""
         if self.rejected is not None:
             return REJECTED
         if not self.detections and self.problem is None:
@@ -101,9 +98,7 @@ def measurement_of(folder, entry, files):
     known = entry if isinstance(entry, dict) else {}
     try:
         with session_errors('frames.json'):
-            if known.get('unreadable'):
-                raise SessionError(str(known['unreadable']))
-            frame = frame_of(folder, dict(entry, depth=entry[STRETCHED_DEPTH]) if STRETCHED_DEPTH in known else entry)
+            frame = frame_of(folder, entry)
     except SessionError as error:
         return EditedMeasurement(str(known.get('id', '')), '', '', problem=str(error),
                                  rejected=str(known['rejected']) if known.get('rejected') else None)

@@ -2,7 +2,6 @@
 import html
 
 from ros_3d_bb.estimation.box3d_estimator import estimator_named
-from ros_3d_bb.visualization.image_overlay import DEPTH_RANGE_M
 from ros_3d_bb_annotator.document import ESTIMATOR
 from ros_3d_bb_annotator.grid_view import FloorScene, GridView
 from ros_3d_bb_annotator.image_view import ImageView
@@ -10,13 +9,13 @@ from ros_3d_bb_annotator.lengths import length_text, position_text
 from ros_3d_bb_annotator.marking import MarkedBox, Scene
 from ros_3d_bb_annotator.measurement import NOBODY
 from ros_3d_bb_annotator.measurement_list import COLORS, IMPLAUSIBLE
-from ros_3d_bb_annotator.pictures import PictureCache, depth_scale
+from ros_3d_bb_annotator.pictures import read_pictures
 from ros_3d_bb_annotator.qt import Qt, QtWidgets, Signal
 from ros_3d_bb_annotator.shared_view import SharedView
 from ros_3d_bb_annotator.truth_panel import TruthPanel, error_text
 from ros_3d_bb_annotator.validation import truth_problems
 
-NOBODY_TEXT = 'Nobody was found: draw a box around the person (D), or reject the measurement (Ctrl+R).'
+NOBODY_TEXT = 'Nobody was found: draw a box around the person (Shift and drag), or reject the measurement (Ctrl+R).'
 HEADER = '<span style="font-size: large"><b>%s</b></span> &nbsp; <b style="color: %s">%s</b> &nbsp; %s'
 
 
@@ -33,10 +32,10 @@ class MeasurementPane(QtWidgets.QWidget):
         self.shared, self.truth, self.floor = SharedView(self), TruthPanel(), GridView()
         self.color_view, self.depth_view = ImageView('colour', self.shared), ImageView('depth', self.shared)
         self.header, self.banner = _label(), _label()
+        self.banner.setText(NOBODY_TEXT)
         self.readout = QtWidgets.QLabel()
-        self.people, self.buttons = QtWidgets.QListWidget(), QtWidgets.QGridLayout()
-        self._document, self._pictures, self._measurement, self._shown, self._index = (None,) * 5
-        self._legend, self._samples_shown = (depth_scale(), length_text(DEPTH_RANGE_M), length_text(0)), True
+        self.people, self.buttons = QtWidgets.QListWidget(), QtWidgets.QHBoxLayout()
+        self._document, self._measurement, self._shown, self._shown_images, self._index = (None,) * 5
         self._lay_out()
         self.header.setText('No session is open: File, Open a session (Ctrl+O).')
         for view in (self.color_view, self.depth_view):
@@ -56,24 +55,21 @@ class MeasurementPane(QtWidgets.QWidget):
 
     def show_document(self, document):
         """Set the document. No measurement is shown yet."""
-        self._document, self._pictures, self._shown = document, PictureCache(document), None
-        self.read_ahead = self._pictures.read_ahead
+        self._document, self._measurement, self._shown, self._shown_images = document, None, None, None
         self.header.setText('This session contains no measurements yet.')
-        self._show_banner(document.notes)
-
-    def read_again(self):
-        """Read the images again when they are shown."""
-        self._pictures.clear()
-        self._document.estimates.clear()
+        self.banner.hide()
 
     def show_measurement(self, number):
-        """Show a measurement, also if it has changed."""
-        self._index, self._measurement = number, self._document.measurements[number]
-        measurement, pictures = self._measurement, self._pictures.of(number)
-        self._shown = pictures
+        """Show a measurement, also if it has changed. The text that is typed for it remains."""
+        before, self._index = self._measurement, number
+        self._measurement = measurement = self._document.measurements[number]
+        images = measurement.id, measurement.color_path, measurement.depth_path
+        if images != self._shown_images:
+            self._shown, self._shown_images = read_pictures(self._document, number), images
+        pictures = self._shown
         self._document.estimates.of(number, pictures.depth)
         self._show_header(measurement)
-        self._show_banner(self._document.notes + (NOBODY_TEXT,) * (measurement.state == NOBODY))
+        self.banner.setVisible(measurement.state == NOBODY)
         image = pictures.color_image or pictures.depth_image
         if image is not None:
             self.shared.show_size(image.width(), image.height())
@@ -81,28 +77,10 @@ class MeasurementPane(QtWidgets.QWidget):
         scene = self._scene()
         self.color_view.show_image(pictures.color_image, scene, pictures.color_problem)
         self.depth_view.show_image(pictures.depth_image, scene, pictures.depth_problem)
-        self.depth_view.show_legend(self._legend if pictures.depth else None)
         self._show_people(measurement)
-        self.truth.show_truth(measurement.truth_m, self._document.draft(number), self._document.mark_of(number))
+        self.truth.show_truth(measurement.truth_m, self._document.mark_of(number),
+                              before is not None and before.id == measurement.id)
         self._show_readout()
-
-    def show_samples(self, shown):
-        self._samples_shown = shown
-        if self._measurement is not None:
-            scene = self._scene()
-            self.color_view.show_scene(scene)
-            self.depth_view.show_scene(scene)
-
-    def _scene(self):
-        return self._scene_of(self._shown.depth if self._samples_shown else None)
-
-    def edit_box(self):
-        """Start to move or resize the selected box by the keyboard."""
-        box = self._scene().person_box() if self._measurement is not None else None
-        if box is not None:
-            self.shared.start_editing(box.rect_px)
-            self.color_view.setFocus()
-        return box is not None
 
     def _show_header(self, measurement):
         details = [text for text in (measurement.label, measurement.stamp_text and 'at %s s' % measurement.stamp_text,
@@ -112,9 +90,9 @@ class MeasurementPane(QtWidgets.QWidget):
         self.header.setText(HEADER % (html.escape(measurement.id), COLORS[state].name(), state,
                                       html.escape(' · '.join(details))))
 
-    def _scene_of(self, depth):
-        """Overlay of the measurement. With a DepthImage it contains the samples of the estimator in each box."""
-        boxes = []
+    def _scene(self):
+        """Overlay of the measurement: boxes, and if there is depth, the samples of the estimator in each of them."""
+        boxes, depth = [], self._shown.depth
         for number, (detection, position_m) in enumerate(
                 zip(self._measurement.detections, self._document.estimates.of(self._index))):
             if detection.box_px is not None:
@@ -125,10 +103,6 @@ class MeasurementPane(QtWidgets.QWidget):
             sample(depth, box.rect_px) for box in boxes
             if box.rect_px[0] < box.rect_px[2] and box.rect_px[1] < box.rect_px[3])
         return Scene(tuple(boxes), self._measurement.person, samples)
-
-    def _show_banner(self, texts):
-        self.banner.setText('<br>'.join(html.escape(text) for text in texts))
-        self.banner.setVisible(bool(texts))
 
     def _show_people(self, measurement):
         self.people.clear()
@@ -162,7 +136,7 @@ class MeasurementPane(QtWidgets.QWidget):
             float(position_m[0]) - truth_m[0], float(position_m[2]) - truth_m[2])
         self.truth.show_error(error_text(error_m), warning)
         camera = document.camera
-        sight = (0.0, 0.0) if camera is None else (-camera.cx / camera.fx, (camera.width - camera.cx) / camera.fx)
+        sight = -camera.cx / camera.fx, (camera.width - camera.cx) / camera.fx
         self.floor.show_scene(FloorScene(
             document.grid, None if truth_m is None else (truth_m[0], truth_m[2]),
             None if position_m is None else tuple(position_m[[0, 2]].tolist()), sight))

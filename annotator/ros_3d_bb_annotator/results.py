@@ -2,7 +2,8 @@
 import os
 
 from ros_3d_bb_annotator import dialogs
-from ros_3d_bb_annotator.export import default_estimator, export
+from ros_3d_bb_annotator.document import ESTIMATOR
+from ros_3d_bb_annotator.export import export
 from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets
 
 
@@ -42,55 +43,41 @@ class Results(QtCore.QObject):
         """Write the table of errors to a file, or show an error message."""
         document = self._window.document
         try:
-            count = export(document, path, default_estimator(document))
+            count = export(document, path, ESTIMATOR)
         except (ValueError, OSError) as error:
             dialogs.show_error(self._window, 'The table was not written', error)
             return
         self._window.statusBar().showMessage('%d rows written to %s' % (count, path))
 
     def analyse(self):
-        """Name implausible truths, run the noise analysis and open its report. Editing is blocked meanwhile."""
-        self._window.keep_typed()
-        self._start('Estimating positions…', self._window.document.outliers, self._on_outliers)
+        """Run the noise analysis and open its report. Editing is blocked meanwhile."""
+        document = self._window.document
+        waiting = QtWidgets.QProgressDialog('Fitting the error model…', None, 0, 0, self._window)
+        waiting.setWindowTitle('Noise analysis')
+        waiting.setWindowModality(Qt.WindowModal)
+        self._work = Work(lambda: _analysed(document), self)
+        self._work.finished.connect(lambda: self._on_finished(waiting))
+        waiting.show()
+        self._work.start()
 
     def wait(self):
         """Wait for a running analysis, because threads must end before Qt is destroyed."""
         if self._work is not None:
             self._work.wait()
 
-    def _start(self, text, work, then):
-        """Run `work()` in a thread while a dialog shows a text, and call `then(result)` if it succeeds."""
-        waiting = QtWidgets.QProgressDialog(text, None, 0, 0, self._window)
-        waiting.setWindowTitle('Noise analysis')
-        waiting.setWindowModality(Qt.WindowModal)
-        self._work = Work(work, self)
-        self._work.finished.connect(lambda: self._on_finished(waiting, then))
-        waiting.show()
-        self._work.start()
-
-    def _on_finished(self, waiting, then):
+    def _on_finished(self, waiting):
         waiting.reset()
         waiting.deleteLater()
         if self._work.error is not None:
             dialogs.show_error(self._window, 'The noise analysis failed', self._work.error)
-        else:
-            then(self._work.result)
-
-    def _on_outliers(self, outliers):
-        answer = dialogs.ask_outliers(self._window, outliers) if outliers else dialogs.ANALYSE
-        if answer == dialogs.ANALYSE:
-            document = self._window.document
-            self._start('Fitting the error model…', lambda: _analysed(document), self._on_analysed)
-        elif answer is not None:
-            self._window.show_measurement(answer)
-            self._window.pane.truth.begin()
-
-    def _on_analysed(self, analysed):
-        self.analysed = analysed
-        self._window.statusBar().showMessage(
-            'Report and figures are in %s; %s' % (analysed.folder, analysed.model_note) if analysed.model_note
-            else 'Report, figures and error model are in %s' % analysed.folder)
-        QtGui.QDesktopServices.openUrl(QtCore.QUrl.fromLocalFile(analysed.report_path))
+            return
+        self.analysed = self._work.result
+        text = ('Report and figures are in %s; %s' % (self.analysed.folder, self.analysed.model_note)
+                if self.analysed.model_note else 'Report, figures and error model are in %s' % self.analysed.folder)
+        if self.analysed.outliers:
+            text += '; %d implausible positions were left out (Ctrl+I)' % len(self.analysed.outliers)
+        self._window.statusBar().showMessage(text)
+        QtGui.QDesktopServices.openUrl(QtCore.QUrl.fromLocalFile(self.analysed.report_path))
 
 
 def _analysed(document):

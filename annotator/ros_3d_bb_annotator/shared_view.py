@@ -1,7 +1,7 @@
 """Shared state of the views of a measurement: visible part of the image, cursor, and box that is being drawn."""
 from ros_3d_bb_annotator.qt import QtCore, Signal
 
-MIN_ZOOM, MAX_ZOOM, ZOOM_STEP = 1.0, 40.0, 1.4
+MIN_ZOOM, MAX_ZOOM = 1.0, 40.0
 MIN_BOX_PX = 4  # smaller boxes are ignored
 
 
@@ -16,7 +16,6 @@ class SharedView(QtCore.QObject):
 
     changed = Signal()
     pointed = Signal()
-    drawing_changed = Signal(bool)
     box_drawn = Signal(object)
     box_edited = Signal(object)
 
@@ -24,7 +23,7 @@ class SharedView(QtCore.QObject):
         super(SharedView, self).__init__(parent)
         self.size = (640, 480)
         self.zoom, self.center = MIN_ZOOM, (0.5, 0.5)
-        self.cursor, self.corner, self.drawing, self.edited = None, None, False, None
+        self.cursor, self.corner, self.edited = None, None, None
 
     def show_size(self, width, height):
         """Set the size of the images in pixels. Zoom and position are kept."""
@@ -32,19 +31,13 @@ class SharedView(QtCore.QObject):
         if self.cursor is not None and not self._is_inside(self.cursor):
             self.cursor = None
 
-    def zoom_by(self, factor, anchor=None):
-        """Zoom around the point `anchor` (x, y) of the image, by default the centre of the view."""
-        shares = self.center if anchor is None else tuple(value / size for value, size in zip(anchor, self.size))
+    def zoom_by(self, factor, anchor):
+        """Zoom around the point `anchor` (x, y) of the image."""
+        shares = tuple(value / size for value, size in zip(anchor, self.size))
         zoom = min(max(self.zoom * factor, MIN_ZOOM), MAX_ZOOM)
         center = tuple(share + (center - share) * self.zoom / zoom for share, center in zip(shares, self.center))
         self.zoom = zoom
         self._move_center(center)
-
-    def zoom_in(self):
-        self.zoom_by(ZOOM_STEP, self.cursor)
-
-    def zoom_out(self):
-        self.zoom_by(1 / ZOOM_STEP, self.cursor)
 
     def pan_by(self, x_px, y_px):
         """Move the visible part by pixels of the image."""
@@ -60,40 +53,13 @@ class SharedView(QtCore.QObject):
         self.pointed.emit()
         self.changed.emit()
 
-    def step(self, columns, rows):
-        """Move the cursor, which starts in the centre of the visible part, and the visible part with it."""
-        start = self.cursor or tuple(int(share * size) for share, size in zip(self.center, self.size))
-        self.point_at(*(min(max(value + move, 0), size - 1)
-                        for value, move, size in zip(start, (columns, rows), self.size)))
-        half = 0.45 / self.zoom
-        self._move_center(min(max(center, value / size - half), value / size + half)
-                          for center, value, size in zip(self.center, self.cursor, self.size))
-
-    def start_drawing(self, drawing):
-        """Set whether dragging draws a box."""
-        changed, self.drawing = drawing != self.drawing, drawing
-        if not drawing:
-            self.corner = None
-        if changed:
-            self.drawing_changed.emit(drawing)
+    def start_drawing(self):
+        """Start to draw a box at the cursor."""
+        self.corner = self.cursor
         self.changed.emit()
-
-    def set_corner(self):
-        """Set the first corner at the cursor, or the second one, which completes the box."""
-        if self.cursor is None:
-            self.step(0, 0)
-        if self.corner is None:
-            self.corner = self.cursor
-            self.changed.emit()
-            return
-        box_px = self.rubber_band()
-        self.cancel()
-        if min(box_px[2] - box_px[0], box_px[3] - box_px[1]) >= MIN_BOX_PX:
-            self.box_drawn.emit(box_px)
 
     def start_editing(self, box_px):
         """Start to move or resize a box (x1, y1, x2, y2)."""
-        self.cancel()
         self.edited = list(box_px)
         self.changed.emit()
 
@@ -104,22 +70,23 @@ class SharedView(QtCore.QObject):
             self.edited[edge] = min(max(self.edited[edge] + (rows if edge % 2 else columns), 0), limit)
         self.changed.emit()
 
-    def finish_editing(self):
-        """Complete the box that is being edited, unless it is tiny."""
-        x1, y1, x2, y2 = self.edited
+    def finish(self):
+        """Complete the box that is being drawn or edited, unless it is tiny."""
+        x1, y1, x2, y2 = box_px = self.rubber_band()
+        signal = self.box_drawn if self.edited is None else self.box_edited
         self.cancel()
-        box_px = min(x1, x2), min(y1, y2), max(x1, x2), max(y1, y2)
-        if min(box_px[2] - box_px[0], box_px[3] - box_px[1]) >= MIN_BOX_PX:
-            self.box_edited.emit(box_px)
+        if min(x2 - x1, y2 - y1) >= MIN_BOX_PX:
+            signal.emit(box_px)
 
     def cancel(self):
-        self.edited = None
-        self.start_drawing(False)
+        self.corner = self.edited = None
+        self.changed.emit()
 
     def rubber_band(self):
         """Box that is being drawn or edited, (x1, y1, x2, y2), including the pixels of both corners, or None."""
         if self.edited is not None:
-            return tuple(self.edited)
+            x1, y1, x2, y2 = self.edited
+            return min(x1, x2), min(y1, y2), max(x1, x2), max(y1, y2)
         if self.corner is None or self.cursor is None:
             return None
         (u1, v1), (u2, v2) = self.corner, self.cursor

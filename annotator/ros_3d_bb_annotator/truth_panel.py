@@ -6,7 +6,6 @@ from ros_3d_bb_annotator.qt import QtCore, QtGui, QtWidgets, Signal
 
 FIELDS = (('x', '&X (right)'), ('z', '&Z (ahead)'), ('y', '&Y (down)'))
 WARNING = '#a04000'
-TYPING_MS = 300  # typed text is kept after a pause of this length
 
 
 class LengthEdit(QtWidgets.QLineEdit):
@@ -24,42 +23,42 @@ class LengthEdit(QtWidgets.QLineEdit):
 class TruthPanel(QtWidgets.QGroupBox):
     """Panel of the truth.
 
-    Signals: `entered` with (x_m, z_m, y_m or None) when Enter is pressed on a complete position; `typed` with the text
-    of the fields to be saved; `previewed` with the current (x_m, y_m or None, z_m), or None if incomplete.
+    Signals: `entered` with (x_m, z_m, y_m or None) when Enter is pressed on a complete position; `previewed` with the
+    current (x_m, y_m or None, z_m), or None if incomplete.
     """
 
     entered = Signal(float, float, object)
-    typed = Signal(dict)
     previewed = Signal(object)
 
     def __init__(self, parent=None):
         super(TruthPanel, self).__init__('True position, mm', parent)
         self.fields = {name: LengthEdit() for name, _label in FIELDS}
         self.error_label, self.hint_label = QtWidgets.QLabel(), QtWidgets.QLabel()
-        self._stored = self.texts()
-        self._timer = QtCore.QTimer(self, singleShot=True, interval=TYPING_MS)
-        self._timer.timeout.connect(self.flush)
+        self._is_typed = False
         self._lay_out()
         for field in self.fields.values():
             field.textEdited.connect(self._on_typed)
             field.returnPressed.connect(self._on_enter)
 
-    def show_truth(self, truth_m, draft, offered=None):
-        """Show the truth (x, y, z) of a person or None, or its draft, or else the position of an offered Mark."""
-        self._timer.stop()
-        hint = 'Typed, but not entered yet: press Enter' if draft else ''
+    def show_truth(self, truth_m, offered, keep_typed):
+        """Show the truth (x, y, z) of a person or None, or else the position of an offered Mark.
+
+        With `keep_typed`, text that was typed but not entered remains.
+        """
+        hint = ''
         if truth_m is None and offered is not None:
             truth_m = offered.x_m, None, offered.z_m
-            hint = hint or 'Mark %s: press Enter to accept it' % offered.name
-        self._stored = {name: _text_of(value_m) for name, value_m in zip('xyz', truth_m or (None,) * 3)}
-        for name, field in self.fields.items():
-            field.setText(draft.get(name, '' if draft else self._stored[name]))
-        self._show_hint(hint)
+            hint = 'Mark %s: press Enter to accept it' % offered.name
+        if not (keep_typed and self._is_typed):
+            self._is_typed = False
+            for name, value_m in zip('xyz', truth_m or (None,) * 3):
+                self.fields[name].setText(_text_of(value_m))
+            self._show_hint(hint)
         self.preview()
 
-    def texts(self):
-        """Text of the fields: {name: text}."""
-        return {name: field.text() for name, field in self.fields.items()}
+    def forget_typed(self):
+        """Show the truth next time instead of the typed text."""
+        self._is_typed = False
 
     def begin(self):
         self.fields['x'].setFocus()
@@ -67,12 +66,6 @@ class TruthPanel(QtWidgets.QGroupBox):
 
     def has_keyboard(self):
         return any(field.hasFocus() for field in self.fields.values())
-
-    def flush(self):
-        """Emit `typed` immediately instead of after a pause."""
-        self._timer.stop()
-        texts = self.texts()
-        self.typed.emit(texts if texts != self._stored and any(texts.values()) else {})
 
     def show_problem(self, text):
         self._show_hint(text, 'color: %s; font-weight: bold' % WARNING)
@@ -103,9 +96,9 @@ class TruthPanel(QtWidgets.QGroupBox):
         form.addRow(self.hint_label)
 
     def _on_typed(self):
+        self._is_typed = True
         self._show_hint('')
         self.preview()
-        self._timer.start()
 
     def _on_enter(self):
         try:
@@ -114,7 +107,6 @@ class TruthPanel(QtWidgets.QGroupBox):
             self.show_problem(str(error))
             self.fields[str(error)[0].lower()].setFocus()
             return
-        self._timer.stop()
         self.entered.emit(*position)
 
     def preview(self):

@@ -1,9 +1,7 @@
 """Validation of sessions: readable images, boxes inside the image, plausible estimates and truth."""
 import collections
-import os
-import pathlib
 
-from ros_3d_bb.sessions.session_reader import SessionError, read_description
+from ros_3d_bb.sessions.session_reader import SessionError
 from ros_3d_bb_annotator.measurement import REJECTED
 
 HALF_PERSON_M = 0.5  # the body of a person whose axis is just outside the image may be visible
@@ -21,27 +19,12 @@ def problems_of(document):
                 yield '%s: %s' % (measurement.id or 'measurement number %d' % (index + 1), problem)
 
 
-def leftovers_of(document):
-    """Sorted relative paths of files that no measurement refers to, such as those left by a killed program."""
-    if document.is_old_format:
-        return []
-    folder = pathlib.Path(document.folder)
-    paths = [*folder.glob('.*.tmp'), *folder.glob('color/*'), *folder.glob('depth/*')]
-    # read after the files are listed, because a viewer may add measurements concurrently
-    entries = [entry for entry in read_description(folder)['frames'] if isinstance(entry, dict)]
-    used = set(os.path.normpath(str(entry.get(kind, ''))) for entry in entries for kind in ('color', 'depth'))
-    return sorted(set(str(path.relative_to(folder)) for path in paths) - used)
-
-
 def _problems_at(document, index):
     measurement = document.measurements[index]
     if measurement.problem is not None:
         return [measurement.problem]
     try:
         document.color(index)
-        if document.is_old_format:
-            document.stretched_depth(index)
-            return _problems_of_truths(document, index)
         document.depth(index)
     except SessionError as error:
         return [str(error)]
@@ -93,8 +76,6 @@ def view_problems(document, truth_m):
     x_m, _y_m, z_m = truth_m
     if not z_m > 0:
         return ['truth z is %g m; more than 0 expected' % z_m]
-    if document.camera is None:
-        return []
     left_m, right_m = document.camera.deproject(
         [(0, document.camera.cy), (document.camera.width, document.camera.cy)], z_m)[:, 0]
     if left_m - HALF_PERSON_M <= x_m <= right_m + HALF_PERSON_M:

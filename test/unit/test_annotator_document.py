@@ -19,7 +19,7 @@ def states(document):
 
 def test_a_new_session_is_read(document):
     first = document.measurements[0]
-    assert states(document) == ['new'] * 4 and document.progress == (0, 4) and document.notes == ()
+    assert states(document) == ['new'] * 4 and document.progress == (0, 4)
     assert (first.id, first.stamp_text, first.label, first.person) == ('m0', '1616161616.000000005', 'by the door', 0)
     assert [detection.box_px for detection in first.detections] == [NEAR_BOX, FAR_BOX]
     assert first.detections[0].size_m.tolist() == [0.533, 1.4] and first.detections[0].support == 0.9
@@ -150,12 +150,3 @@ def test_boxes_are_replaced_and_deleted_with_their_truth(document, folder):
 
 def opened(folder):
     return Document.open(folder).measurements
-
-
-def test_drafts_are_kept_until_the_truth_is_entered(document):
-    document.set_draft(1, {'x': '12', 'z': ''})
-    document.set_draft(2, {'reason': 'blu'})
-    assert document.draft(1) == {'x': '12'} and document.draft(2) == {'reason': 'blu'} and document.draft(0) == {}
-    document.set_truth(1, 0.12, 2.0)
-    document.reject(2, 'blurred')
-    assert document.draft(1) == document.draft(2) == {}

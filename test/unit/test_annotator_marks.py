@@ -1,7 +1,7 @@
-"""Floor marks from tables as text, and grids of marks."""
+"""Floor marks from tables as text."""
 import pytest
 
-from ros_3d_bb_annotator.marks import grid_of, parse_marks
+from ros_3d_bb_annotator.marks import parse_marks
 from ros_3d_bb_annotator.measurement import Mark
 
 MARKS = (Mark('A1', -0.6, 1.5), Mark('B1', 0.0, 1.5))
@@ -29,12 +29,3 @@ def test_marks_whose_names_begin_as_a_header_are_kept():
 def test_invalid_tables_are_rejected(text, named):
     with pytest.raises(ValueError, match=named):
         parse_marks(text)
-
-
-def test_a_grid_has_columns_and_rows():
-    marks = grid_of('-600 0; 0.6m', '1500 2m')
-    assert [mark.name for mark in marks] == ['A1', 'B1', 'C1', 'A2', 'B2', 'C2']
-    assert marks[0] == Mark('A1', -0.6, 1.5) and marks[5] == Mark('C2', 0.6, 2.0)
-    for x_texts, z_texts in (('', '1500'), ('0', ''), ('0', '-1'), ('a', '1')):
-        with pytest.raises(ValueError):
-            grid_of(x_texts, z_texts)

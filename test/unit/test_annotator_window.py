@@ -40,7 +40,7 @@ def test_a_click_on_a_box_or_its_list_entry_selects_it(drive, folder, name):
     view = getattr(drive.window.pane, name)
     drive.click(view, place_in(view, *np.mean([FAR_BOX[:2], FAR_BOX[2:]], axis=0)))
     assert opened(folder)[0].person == 1
-    drive.press(Qt.Key_F3, '+', '+')
+    view._shared.zoom_by(2, (20, 24))
     drive.click(view, place_in(view, NEAR_BOX[2] - 1, 24))
     assert opened(folder)[0].person == 0
     drive.click(view, place_in(view, 33, 24))  # between the people
@@ -51,9 +51,8 @@ def test_a_click_on_a_box_or_its_list_entry_selects_it(drive, folder, name):
     assert opened(folder)[0].person == 1
 
 
-def test_a_box_is_drawn_with_shift_and_drag_unless_it_is_tiny_or_cancelled(drive, folder):
+def test_a_box_is_drawn_with_shift_and_drag_unless_it_is_tiny(drive, folder):
     view = drive.window.pane.color_view
-    drive.press(Qt.Key_F3, Qt.Key_Space, Qt.Key_Right, Qt.Key_Escape, Qt.Key_Down)
     drive.drag(view, place_in(view, 20.5, 20.5), place_in(view, 22.5, 22.5), SHIFT)
     assert len(drive.measurement(0).detections) == 2 and not drive.document.can_undo
     drive.drag(view, place_in(view, 11.5, 5.5), place_in(view, 25.5, 43.5), SHIFT)
@@ -70,22 +69,16 @@ def test_a_click_on_a_mark_sets_the_truth(drive, folder):
     assert opened(folder)[1].truth_m is None
 
 
-def add_mark(dialog, *texts):
-    dialog.add_empty()
-    for column, text in enumerate(texts):
-        dialog.table.item(dialog.table.rowCount() - 1, column).setText(text)
-
-
-def test_marks_are_edited_in_a_dialog_and_selected_by_the_keyboard(drive, folder):
+def test_marks_are_edited_in_a_dialog(drive, folder):
     def add_marks(dialog):
-        add_mark(dialog, 'B1', '0', '2000')
-        add_mark(dialog, 'B2', '0', '3000')
+        dialog.text.appendPlainText('B1, 0, 2000\nB2, 0')
+        dialog.accept()
+        assert 'line 3' in dialog.problem.text()
+        dialog.text.setPlainText(dialog.text.toPlainText() + ', 3 m')
         dialog.accept()
     drive.answer(add_marks, lambda: drive.press((Qt.Key_G, CONTROL)))
     assert Document.open(folder).grid == (Mark('A1', -0.5, 2.0), Mark('B1', 0, 2), Mark('B2', 0, 3))
-    drive.press(Qt.Key_F6, Qt.Key_Up, Qt.Key_Left, Qt.Key_Return)  # B1 is nearest; then A1
-    assert opened(folder)[0].truth_m == (-0.5, None, 2)
-    drive.press((Qt.Key_Z, CONTROL), (Qt.Key_Z, CONTROL))
+    drive.press((Qt.Key_Z, CONTROL))
     assert Document.open(folder).grid == (Mark('A1', -0.5, 2.0),)
 
 
@@ -131,31 +124,20 @@ def test_boxes_are_moved_resized_and_deleted(drive, folder):
     assert opened(folder)[0].detections[0].box_px == (x1, y1, x2 + 4, y2)
     drive.drag(view, place_in(view, 18, 24), place_in(view, 20, 27), CONTROL)
     assert opened(folder)[0].detections[0].box_px == (x1 + 2, y1 + 3, x2 + 6, y2 + 3)
-    drive.press((Qt.Key_B, CONTROL), (Qt.Key_Left, CONTROL), (Qt.Key_Up, CONTROL | SHIFT), Qt.Key_Return)
-    assert opened(folder)[0].detections[0].box_px == (x1 + 1, y1 + 3, x2 + 5, y2 + 2)
-    drive.press((Qt.Key_B, CONTROL), Qt.Key_Right, Qt.Key_Escape, (Qt.Key_D, CONTROL | SHIFT))
+    drive.press((Qt.Key_D, CONTROL | SHIFT))
     assert [one.box_px for one in opened(folder)[0].detections] == [FAR_BOX]
     drive.press((Qt.Key_Z, CONTROL))
     assert len(opened(folder)[0].detections) == 2
 
 
 def test_truth_and_rejection_are_entered_for_all_selected_measurements(drive, folder):
-    drive.press(Qt.Key_F2, (Qt.Key_Down, SHIFT), (Qt.Key_Down, SHIFT), Qt.Key_F4)
+    drive.window.list.setFocus()
+    drive.press((Qt.Key_Down, SHIFT), (Qt.Key_Down, SHIFT), Qt.Key_F4)
     assert drive.window.selection == [0, 1, 2]
     drive.press('-500', Qt.Key_Tab, '2100', Qt.Key_Return)
     assert [one.state for one in opened(folder)] == ['annotated'] * 3 + ['new'] and drive.window.selection == [3]
-    drive.press(Qt.Key_F2, (Qt.Key_Up, SHIFT))
+    drive.window.list.setFocus()
+    drive.press((Qt.Key_Up, SHIFT))
     drive.answer(lambda dialog: (dialog.setTextValue('no person'), dialog.accept()),
                  lambda: drive.press((Qt.Key_R, CONTROL)))
     assert [one.state for one in opened(folder)] == ['annotated'] * 2 + ['rejected'] * 2
-
-
-def test_the_list_is_sorted_and_searched(drive):
-    table, search = drive.window.list.table, drive.window.list.search
-    drive.press('-500', Qt.Key_Tab, '2050', Qt.Key_Return, '-500', Qt.Key_Tab, '2150', Qt.Key_Return)
-    table.sortByColumn(4, Qt.DescendingOrder)
-    assert [table.model().index(row, 0).data() for row in range(2)] == ['m1', 'm0']
-    drive.press((Qt.Key_F, CONTROL), 'm3')
-    assert table.model().rowCount() == 1
-    search.setText('2150')
-    assert [table.model().index(row, 0).data() for row in range(table.model().rowCount())] == ['m1']

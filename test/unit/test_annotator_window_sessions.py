@@ -14,14 +14,16 @@ def message_of(box):
     return box.text() + box.informativeText()
 
 
-def test_typed_text_is_restored(drive):
-    drive.press('12', Qt.Key_Tab, '2.')
-    drive.press(Qt.Key_PageDown)
-    assert drive.window.pane.truth.fields['x'].text() == ''
+def test_typed_text_stays_until_it_is_entered_or_another_measurement_is_shown(drive):
+    fields = drive.window.pane.truth.fields
+    drive.press('-500', Qt.Key_Tab, '2100', (Qt.Key_2, ALT), (Qt.Key_1, ALT))
+    assert [fields[name].text() for name in 'xz'] == ['-500', '2100']
+    drive.press(Qt.Key_F4, Qt.Key_Return, Qt.Key_PageUp)
+    assert drive.measurement(0).truth_m == (-0.5, None, 2.1)
+    drive.press('12', Qt.Key_PageDown)
+    assert fields['x'].text() == ''
     drive.press(Qt.Key_PageUp)
-    assert [drive.window.pane.truth.fields[name].text() for name in 'xz'] == ['12', '2.']
-    drive.press('5')
-    drive.wait_for(lambda: drive.document.draft(0).get('x') == '5')  # what was selected is replaced
+    assert fields['x'].text() == '-500'
 
 
 @pytest.fixture
@@ -34,18 +36,19 @@ def test_changes_by_other_programs_are_shown(fast_refresh, window_on, folder):
     drive.press('12')
     entry = write_measurement(folder, 'm4')
     change_json(folder, lambda content: content['frames'].append(entry))
-    drive.wait_for(lambda: drive.window.list.table.model().rowCount() == 5)
+    drive.wait_for(lambda: drive.window.list.model().rowCount() == 5)
     assert drive.window.pane.truth.fields['x'].text() == '12' and drive.window.current == 0
     assert drive.window.progress.text() == '0 of 5 done'
-    drive.press((Qt.Key_End, ALT), '34')
+    drive.window.show_measurement(4)
+    drive.press('34')
     change_json(folder, lambda content: content['frames'].pop())
-    drive.wait_for(lambda: drive.window.list.table.model().rowCount() == 4)
-    assert drive.window.current == 0 and drive.window.pane.truth.fields['x'].text() == '12'
+    drive.wait_for(lambda: drive.window.list.model().rowCount() == 4)
+    assert drive.window.current == 0 and drive.window.pane.truth.fields['x'].text() == ''
 
 
 def test_a_measurement_in_place_of_a_deleted_one_is_shown_with_its_own_image(fast_refresh, window_on, folder):
     drive = window_on(folder)
-    drive.press((Qt.Key_End, ALT))
+    drive.window.show_measurement(3)
     before_m = drive.document.estimates.of(3)[0][2]
     entry = write_measurement(folder, 'm4')  # as d and s in the viewer
     path = os.path.join(folder, entry['depth'])
@@ -53,7 +56,9 @@ def test_a_measurement_in_place_of_a_deleted_one_is_shown_with_its_own_image(fas
     change_json(folder, lambda content: content['frames'].__setitem__(3, entry))
     drive.wait_for(lambda: drive.measurement(3).id == 'm4')
     assert drive.document.estimates.of(3)[0][2] == pytest.approx(before_m - 0.5, abs=0.02)
-    assert drive.window.pane.depth_view.image != drive.window.pane._pictures.of(2).depth_image
+    shown = drive.window.pane.depth_view.image
+    drive.window.show_measurement(2)
+    assert drive.window.pane.depth_view.image != shown
 
 
 def test_an_invalid_session_gives_a_message(window_on, tmp_path):

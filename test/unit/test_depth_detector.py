@@ -181,6 +181,29 @@ def test_the_last_floor_is_used_if_none_is_visible():
     assert DepthPeople().detect(color, hidden, CAMERA) is None
 
 
+def test_a_person_who_crouches_stays_detected():
+    simulator, detector = Simulator(read_scenario(scenario_path('following_robot'))), DepthPeople()
+    for number in range(42, 58, 3):  # crouches from 43 to 49
+        frame = simulator.frame(number)
+        map_from_camera = frame.poses.map_from_camera
+        found = detector.detect(frame.color, DepthImage(frame.depth_mm, 0.001), simulator.camera,
+                                floor_from_transform(np.linalg.inv(map_from_camera)))
+        x_m, _y_m, z_m = transform_points(np.linalg.inv(map_from_camera), (5.0, -2.2, 0.6))
+        column = simulator.camera.cx + simulator.camera.fx * x_m / z_m
+        assert any(left < column < right for left, _top, right, _bottom in found.boxes.tolist()), number
+
+
+def test_furniture_in_the_place_of_a_person_is_not_detected():
+    with_person, with_furniture = Room(), Room()
+    with_person.person(0.3, 3.0)
+    with_furniture.block(0.3, 3.0, 0.0, 1.1, 0.3)
+    detector, counts = DepthPeople(), []
+    for room in (with_person, with_furniture, with_furniture):
+        color, depth = room.images()
+        counts.append(len(detector.detect(color, depth, room.camera, room.floor).boxes))
+    assert counts == [1, 0, 0]
+
+
 @pytest.mark.slow
 def test_detects_the_people_of_a_session_with_few_false_positives(session_folder):
     """On real frames at least 97 % of the people whose body is in view at 1.4 m or more are detected, with at most 2

@@ -1,9 +1,8 @@
-"""Command `process_bag`: run the pipeline on one or more bags without a ROS master."""
+"""Command `process_bag`: run the pipeline on a bag without a ROS master."""
 import argparse
 import math
 import os
 import sys
-from typing import NamedTuple
 
 import yaml
 
@@ -23,48 +22,28 @@ FILES = (('--yolov5-params', 'yolov5'), ('--depth-params', 'depth'), ('--bbox3d-
 OPTIONS = 'weights', 'error_model', 'target_frame', 'cameras', 'depth', 'image_rotation'  # parameters with an option
 
 
-class Job(NamedTuple):
-    """A bag to be processed: input and output paths, and settings."""
-
-    source: str
-    target: str
-    settings: Settings
-
-
 def main(arguments=None):
-    """Run the command. The exit status is 1 if a bag could not be processed."""
+    """Run the command. The exit status is 1 if the bag could not be processed."""
     parser = _parser()
     given = parser.parse_args(arguments)
     try:
-        jobs = _jobs_from(given)
+        if os.path.realpath(given.source) == os.path.realpath(given.target):
+            raise ValueError('the output %s is also the input; choose another output' % given.target)
+        if given.searches < 0:
+            raise ValueError('--searches is %d; 0 or more expected' % given.searches)
+        settings = _settings_from(given)
     except (ValueError, OSError, yaml.YAMLError) as error:
         parser.error(str(error))
     try:
-        failed = [job for job in jobs if not _process(job)]
+        events = process_bag(given.source, given.target, settings)
     except KeyboardInterrupt:
         print('process_bag: interrupted; the incomplete bag was removed', file=sys.stderr)
         sys.exit(130)
-    sys.exit(1 if failed else 0)
-
-
-def _jobs_from(given):
-    """Return the jobs for the command line arguments. Raises ValueError or OSError if they are invalid."""
-    if given.out_dir is None and len(given.bags) != 2:
-        raise ValueError('expected IN and OUT, or bags and --out-dir')
-    pairs = [tuple(given.bags)] if given.out_dir is None else [
-        (bag, os.path.join(given.out_dir, os.path.basename(bag))) for bag in given.bags]
-    sources, targets = ([os.path.realpath(path) for path in paths] for paths in zip(*pairs))
-    for target in targets:
-        if target in sources:
-            raise ValueError('the output %s is also an input; choose another output' % target)
-        if targets.count(target) > 1:
-            raise ValueError('two inputs have the output %s; rename one, or process them separately' % target)
-    if given.searches < 0:
-        raise ValueError('--searches is %d; 0 or more expected' % given.searches)
-    settings = _settings_from(given)
-    if given.out_dir is not None:
-        os.makedirs(given.out_dir, exist_ok=True)
-    return [Job(source, target, settings) for source, target in pairs]
+    except Exception as error:  # a damaged bag can raise any exception
+        print('%s; no bag was written' % _reason(given.source, settings, error), file=sys.stderr)
+        sys.exit(1)
+    print('\n'.join(['%s:' % given.target] + _summary(events, settings.detector)))
+    sys.exit(0)
 
 
 def _settings_from(given):
@@ -160,24 +139,13 @@ def read_params(path, defaults):
                  for part, new in zip(defaults, found))
 
 
-def _process(job):
-    """Process a bag and print the result. Returns whether it succeeded; an error does not stop the other bags."""
-    try:
-        events = process_bag(job.source, job.target, job.settings)
-    except Exception as error:  # a damaged bag can raise any exception
-        print('%s; no bag was written' % _reason(job, error), file=sys.stderr, flush=True)
-        return False
-    print('\n'.join(['%s:' % job.target] + _summary(events, job.settings.detector)), flush=True)
-    return True
-
-
-def _reason(job, error):
-    """Return why a job failed, as a sentence that names its bag."""
+def _reason(source, settings, error):
+    """Return why a bag was not processed, as a sentence that names it."""
     if isinstance(error, BagError):
         return str(error)
     if isinstance(error, (ValueError, OSError)):
-        return '%s: %s' % (job.source, with_places(str(error), lambda name: option_of(name, job.settings.detector)))
-    return '%s: %s: %s' % (job.source, type(error).__name__, cause(error))
+        return '%s: %s' % (source, with_places(str(error), lambda name: option_of(name, settings.detector)))
+    return '%s: %s: %s' % (source, type(error).__name__, cause(error))
 
 
 def option_of(name, detector):
@@ -224,10 +192,10 @@ def _names(remaps):
 
 
 def _parser():
-    parser = argparse.ArgumentParser(prog='process_bag', description='Copy bags and add 2D boxes, 3D boxes, tracks and '
-                                     'markers. Equal inputs give identical bytes.')
-    parser.add_argument('bags', nargs='+', metavar='BAG', help='IN OUT; or, with --out-dir, the input bags')
-    parser.add_argument('--out-dir', metavar='DIR', help='folder of the outputs, which have the names of the inputs')
+    parser = argparse.ArgumentParser(prog='process_bag', description='Copy a bag and add 2D boxes, 3D boxes, tracks '
+                                     'and markers. Equal inputs give identical bytes.')
+    parser.add_argument('source', metavar='IN', help='bag to process')
+    parser.add_argument('target', metavar='OUT', help='bag to write')
     parser.add_argument('--detector', choices=DETECTORS, default='yolov5',
                         help='none: use the 2D boxes in the bag (default: yolov5)')
     parser.add_argument('--weights', metavar='FILE', help='checkpoint or export for yolov5')

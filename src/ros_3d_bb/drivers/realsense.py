@@ -22,8 +22,6 @@ EXPOSURE_UNIT_S = 1e-4  # unit of the colour sensor's exposure
 # librealsense uses the same projection for the modified and the inverse Brown-Conrady model.
 DISTORTIONS = {'none': ('', 0), 'brown_conrady': (PLUMB_BOB, 5), 'modified_brown_conrady': (INVERSE_BROWN_CONRADY, 5),
                'inverse_brown_conrady': (INVERSE_BROWN_CONRADY, 5), 'kannala_brandt4': (EQUIDISTANT, 4)}
-# In the order that librealsense recommends.
-FILTERS = ('decimation', 'disparity', 'spatial', 'temporal', 'hole_filling')
 
 
 class CameraLost(Exception):
@@ -38,7 +36,6 @@ class RealSenseParams(NamedTuple):
     width: int = Param(640, limits=(1, 10000))
     height: int = Param(480, limits=(1, 10000))
     fps: int = Param(30, limits=(1, 10000))
-    filters: list = Param((), choices=FILTERS)
     exposure: float = Param(0.0)
     file: str = Param('')
     real_time: bool = Param(
@@ -89,8 +86,7 @@ class RealSense(object):
     def __init__(self, params):
         self._rs = librealsense(params)
         self._stamps, self.is_over, self._last_image_s = Stamps(), False, time.monotonic()
-        self._align, self._filters = self._rs.align(self._rs.stream.color), _filters(self._rs, params.filters)
-        self._pipeline = self._rs.pipeline()
+        self._align, self._pipeline = self._rs.align(self._rs.stream.color), self._rs.pipeline()
         try:
             config = _config(self._rs, params)
             # Options are set before the start; otherwise a recording would lose its first images.
@@ -147,8 +143,6 @@ class RealSense(object):
         try:
             if not (frames.get_depth_frame() and frames.get_color_frame()):
                 raise ValueError('colour without depth, or depth without colour')
-            for a_filter in self._filters:
-                frames = a_filter.process(frames).as_frameset()
             frames = self._align.process(frames)
             color, depth = frames.get_color_frame(), frames.get_depth_frame()
             # Both images get the stamp of depth, because depth determines positions.
@@ -237,16 +231,6 @@ def _config(rs, params):
     config.enable_stream(rs.stream.depth, params.width, params.height, rs.format.z16, params.fps)
     config.enable_stream(rs.stream.color, params.width, params.height, rs.format.rgb8, params.fps)
     return config
-
-
-def _filters(rs, names):
-    """Depth filters in the recommended order. With `disparity`, spatial and temporal filters work on disparity."""
-    factories = {'decimation': rs.decimation_filter, 'spatial': rs.spatial_filter, 'temporal': rs.temporal_filter,
-                 'hole_filling': rs.hole_filling_filter, 'disparity': lambda: rs.disparity_transform(True)}
-    filters = [factories[name]() for name in FILTERS if name in names]
-    if 'disparity' in names:
-        filters.insert(len(filters) - ('hole_filling' in names), rs.disparity_transform(False))
-    return filters
 
 
 def _set(sensor, option, value):

@@ -12,11 +12,14 @@ from ros_3d_bb.detection.boxes import Detections
 from ros_3d_bb.detection.depth.ground_plane import FittedFloor, check_upright
 from ros_3d_bb.detection.depth.person_classifier import (BEST_HOG, PersonHog, PersonWindow, person_score, pyramid_of,
                                                          shape_features_of)
-from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams, find_person_clusters, grid_of, quantile_of
+from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams, find_person_clusters, grid_of, is_standing, quantile_of
 
 MEAN_HEIGHT_M, MEAN_WIDTH_M = 1.7, 0.5  # assumed for people who are partly outside the image
 SURE_SCORE = 0.95  # no further HOG scores are evaluated from this score on
 MAX_HOG_AGE = 2  # number of further images for which the HOG score of a person is used
+# A person who was sure in an image continues with a lower score, as one who crouches, for this many images, of which one
+# without the person counts as several; chosen: furniture has lower scores, and 75 images are 5 s of the demo.
+CONTINUED_SCORE, MAX_UNSURE, NOT_FOUND = 0.1, 75, 15
 NEARER_M, HIDDEN_SHARE = 0.3, 0.5  # of a person who hides the legs of another one, and of the width of these; chosen
 MIN_DISTANCE_M = 0.35  # between the centres of two people; closer detections are one person
 
@@ -24,7 +27,7 @@ MIN_DISTANCE_M = 0.35  # between the centres of two people; closer detections ar
 class DepthDetection(NamedTuple):
     """A detected person: box (x1, y1, x2, y2), score 0..1, and position to the right and ahead of the camera.
 
-    The HOG score is that of `hog_age` images ago.
+    The HOG score is that of `hog_age` images ago. The person was sure `unsure` images ago.
     """
 
     box: Tuple[float, float, float, float]
@@ -32,6 +35,7 @@ class DepthDetection(NamedTuple):
     position_m: Tuple[float, float]
     hog: float
     hog_age: int
+    unsure: int = 0
 
 
 class DepthPeople(object):
@@ -43,11 +47,11 @@ class DepthPeople(object):
     def __init__(self, params=DepthPeopleParams()):
         self.reconfigure(params)
         self._hog, self._fitted_floor = PersonHog(), FittedFloor()
-        self._last_people = []  # DepthDetections in the last image
+        self._last_people = []  # DepthDetections in the last image, and those lost since
 
     def reconfigure(self, params):
         """Change the DepthPeopleParams. If two contradict each other, raise ValueError and keep the old ones."""
-        for name in ('depth', 'width', 'top', 'camera_height'):
+        for name in ('depth', 'camera_height'):
             low, high = getattr(params, 'min_%s' % name), getattr(params, 'max_%s' % name)
             if not low < high:
                 raise ValueError('min_%s is %g and max_%s is %g; min_%s must be smaller'
@@ -78,27 +82,43 @@ class DepthPeople(object):
         pyramid = pyramid_of(image)
         people = []
         for blob, shape in find_person_clusters(grid, camera, self._params):
+            box = box_of(blob, shape, grid, camera, floor)
+            position_m = ((box[0] + box[2]) / 2.0 - camera.cx) / camera.fx * shape.depth_m, shape.depth_m
+            last = self._last_at(position_m)
+            if last is None and not is_standing(shape, self._params):
+                continue
             features = shape_features_of(blob.mask, blob.window(grid.ahead_m), shape.thickness_m)
             if person_score(features, BEST_HOG, shape.cut_top) < self._params.min_score:
                 continue  # rejected by its shape alone: HOG cannot raise the score enough
-            box = box_of(blob, shape, grid, camera, floor)
-            position_m = ((box[0] + box[2]) / 2.0 - camera.cx) / camera.fx * shape.depth_m, shape.depth_m
             window = person_window_of(blob, shape, grid, camera, floor)
-            for hog, hog_age in self._hog_scores(pyramid, window, position_m):
+            for hog, hog_age in self._hog_scores(pyramid, window, last):
                 score = person_score(features, hog, shape.cut_top)
                 if score >= SURE_SCORE:
                     break
-            if score >= self._params.min_score:
-                people.append(DepthDetection(box, score, position_m, hog, hog_age))
-        self._last_people = people
+            unsure = 0
+            if score < self._params.min_score or not is_standing(shape, self._params):
+                unsure = last.unsure + 1 if last and score >= CONTINUED_SCORE else MAX_UNSURE + 1
+            if unsure <= MAX_UNSURE:
+                people.append(DepthDetection(box, score, position_m, hog, hog_age, unsure))
+        people = _without_repeated(people)
+        self._last_people = people + self._lost(people)
         return _merged_detections([_completed(person, people, camera, floor) for person in people])
 
-    def _hog_scores(self, pyramid, window, position_m):
-        """Yield HOG scores and their ages: that of a person at the same place in the last image, then new ones."""
-        for person in self._last_people:
-            if person.hog_age < MAX_HOG_AGE and _distance_m(person.position_m, position_m) < MIN_DISTANCE_M:
-                yield person.hog, person.hog_age + 1
-                break
+    def _last_at(self, position_m):
+        """The DepthDetection in the last image at a position; None without one."""
+        return next((person for person in self._last_people
+                     if _distance_m(person.position_m, position_m) < MIN_DISTANCE_M), None)
+
+    def _lost(self, people):
+        """The people of the last image who are not found again, and may be in the next one."""
+        return [lost._replace(unsure=lost.unsure + NOT_FOUND, hog_age=MAX_HOG_AGE) for lost in self._last_people
+                if lost.unsure + NOT_FOUND < MAX_UNSURE and all(
+                    _distance_m(lost.position_m, person.position_m) >= 2 * MIN_DISTANCE_M for person in people)]
+
+    def _hog_scores(self, pyramid, window, last):
+        """Yield HOG scores and their ages: that of the person in the last image, if any, then new ones."""
+        if last is not None and last.hog_age < MAX_HOG_AGE:
+            yield last.hog, last.hog_age + 1
         for hog in self._hog.scores(pyramid, window):
             yield hog, 0
 
@@ -151,6 +171,13 @@ def _hides_legs(other, person):
 
 def _distance_m(one_m, other_m):
     return math.hypot(one_m[0] - other_m[0], one_m[1] - other_m[1])
+
+
+def _without_repeated(people):
+    """The DepthDetections without what is beside a sure one and may continue the same person, such as a chair."""
+    sure = [person for person in people if not person.unsure]
+    return [person for person in people if not person.unsure or all(
+        _distance_m(person.position_m, other.position_m) >= 2 * MIN_DISTANCE_M for other in sure)]
 
 
 def _merged_detections(people):

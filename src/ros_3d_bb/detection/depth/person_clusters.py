@@ -10,9 +10,19 @@ import numpy as np
 
 from ros_3d_bb.core.params import Param, parameters
 
+CELL_RAD = 0.0065  # of the grid of depth pixels that are used: 4 pixels of a RealSense at 640x480
+FLOOR_M, CEILING_M = 0.12, 2.15  # what is lower above the floor is floor, what is higher is ceiling
+# A step in depth of STEP_M + STEP_GROWTH_PER_M * depth^2, which grows as the error of stereo, separates two surfaces.
+STEP_M, STEP_GROWTH_PER_M = 0.08, 0.006
+MIN_WIDTH_M, MAX_WIDTH_M = 0.2, 1.15  # of a person; the largest with the arms stretched out
+MAX_THICKNESS_M = 0.9  # along the line of sight: a long stride
+MAX_TOP_M, MAX_BOTTOM_M = 2.1, 0.8  # above the floor: of the head, and of the lowest visible part; legs may be hidden
+MIN_VISIBLE_M, MIN_VISIBLE_CUT_M = 0.9, 0.5  # height of the visible part; where the image ends below the head
 MIN_CELLS = 20  # smaller clusters are ignored; a person 6 m away has about 300 cells
 HEADROOM_M = 0.15  # minimum depth of the valley between the heads of two people side by side
 HIP_M = 0.95  # lower peaks do not count: in an image cut above the hips, the legs of one person form a valley, too
+# Smallest height of the top and of the visible part of a person who crouches, sits or bends; chosen.
+LOW_TOP_M, LOW_VISIBLE_M = 0.7, 0.5
 TWO_LAYERS = 0.7  # between-class share of the variance of two depth layers; 0.64 for noise, 0.75 for a slanted wall
 
 
@@ -23,27 +33,9 @@ class DepthPeopleParams(NamedTuple):
     min_depth: float = Param(0.4, 'Nearest person, along the optical axis.', 'm', live=(0, 3))
     max_depth: float = Param(
         6.5, 'Farthest person. Farther away a person is too few pixels and too much noise.', 'm', live=(1, 15))
-    cell_angle: float = Param(
-        0.0065, 'Grid of the depth pixels that are used: 4 pixels of a RealSense at 640x480.', 'rad',
-        limits=(1e-6, 0.05), live=(0.001, 0.05))
-    floor_margin: float = Param(0.12, 'What is lower than this above the floor is floor.', 'm', live=(0, 0.5))
-    max_height: float = Param(2.15, 'What is higher is ceiling.', 'm', live=(1.5, 3))
-    depth_step: float = Param(
-        0.08, 'A step in depth of depth_step + depth_step_growth * depth^2 separates two surfaces.', 'm',
-        live=(0.01, 0.5))
-    depth_step_growth: float = Param(
-        0.006, 'The part of that step that grows as the error of stereo does.', '1/m', live=(0, 0.05))
-    min_width: float = Param(0.2, 'Smallest width of a person.', 'm', live=(0, 0.6))
-    max_width: float = Param(1.15, 'Largest width: arms stretched out.', 'm', live=(0.6, 2))
-    max_thickness: float = Param(0.9, 'Largest extent along the line of sight: a long stride.', 'm', live=(0.3, 2))
     min_top: float = Param(
         1.25, 'Smallest height of the top of the head above the floor. Children and people who sit are lower.', 'm',
-        live=(0.5, 1.8))
-    max_top: float = Param(2.1, 'Largest height of the top of the head.', 'm', live=(1.8, 2.5))
-    max_bottom: float = Param(
-        0.8, 'Largest height of the lowest visible part above the floor: legs may be hidden.', 'm', live=(0, 1.5))
-    min_visible: float = Param(0.9, 'Smallest height of the visible part.', 'm', live=(0, 1.7))
-    min_visible_cut: float = Param(0.5, 'The same where the image ends below the head.', 'm', live=(0, 1.7))
+        limits=(0, MAX_TOP_M), live=(0.5, 1.8))
     min_camera_height: float = Param(
         0.08, 'Smallest height of the camera above a floor that is fitted to the depth image, where tf gives none.',
         'm', live=(0, 2))
@@ -97,7 +89,7 @@ class Shape(NamedTuple):
 
 def grid_of(depth, camera, floor, params):
     """Sample a depth image on the grid. Returns Grid."""
-    step = max(1, int(round(params.cell_angle * camera.fx)))
+    step = max(1, int(round(CELL_RAD * camera.fx)))
     values = depth.part(slice(step // 2, None, step), slice(step // 2, None, step))
     depth_m = values.astype(np.float32) * np.float32(depth.scale_m)
     with np.errstate(invalid='ignore'):  # nan
@@ -112,8 +104,8 @@ def grid_of(depth, camera, floor, params):
 
 
 def find_person_clusters(grid, camera, params):
-    """Return (Blob, Shape) of each blob of human size."""
-    clusters = _merge_stacked(_split_blobs(grid, camera, params), grid, camera, params)
+    """Return (Blob, Shape) of each blob of human size, of people who crouch, too."""
+    clusters = _merge_stacked(_split_blobs(grid, camera, params), grid, camera)
     return [(blob, shape) for blob, shape in clusters if _is_human(shape, params)]
 
 
@@ -125,10 +117,10 @@ def _foreground_cells(grid, params):
     """
     depth_m = grid.depth_m
     cells = (depth_m > 0) & (depth_m < params.max_depth)
-    cells &= (grid.height_m > params.floor_margin) & (grid.height_m < params.max_height)
+    cells &= (grid.height_m > FLOOR_M) & (grid.height_m < CEILING_M)
     for after, before in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):
         change_m = depth_m[after] - depth_m[before]
-        max_step_m = params.depth_step + params.depth_step_growth * np.minimum(depth_m[after], depth_m[before]) ** 2
+        max_step_m = STEP_M + STEP_GROWTH_PER_M * np.minimum(depth_m[after], depth_m[before]) ** 2
         cells[after] &= change_m <= max_step_m
         cells[before] &= change_m >= -max_step_m
     return cells
@@ -153,11 +145,16 @@ def quantile_of(values, share):
 
 def _is_human(shape, params):
     cut = 0.6 if shape.cut_side else 1.0
-    visible_m = params.min_visible_cut if shape.cut_top else params.min_visible
-    return (cut * params.min_width <= shape.width_m <= params.max_width
-            and shape.thickness_m <= params.max_thickness and shape.top_m - shape.bottom_m >= visible_m
-            and (shape.cut_top or params.min_top <= shape.top_m) and shape.top_m <= params.max_top
-            and (shape.cut_bottom or shape.bottom_m <= params.max_bottom))
+    return (cut * MIN_WIDTH_M <= shape.width_m <= MAX_WIDTH_M
+            and shape.thickness_m <= MAX_THICKNESS_M and shape.top_m - shape.bottom_m >= LOW_VISIBLE_M
+            and (shape.cut_top or LOW_TOP_M <= shape.top_m) and shape.top_m <= MAX_TOP_M
+            and (shape.cut_bottom or shape.bottom_m <= MAX_BOTTOM_M))
+
+
+def is_standing(shape, params):
+    """Whether a blob of human size is as high as a standing person."""
+    visible_m = MIN_VISIBLE_CUT_M if shape.cut_top else MIN_VISIBLE_M
+    return shape.top_m - shape.bottom_m >= visible_m and (shape.cut_top or params.min_top <= shape.top_m)
 
 
 def _connected(cells, row=0, column=0):
@@ -176,8 +173,8 @@ def _split_blobs(grid, camera, params):
     while to_split:
         blob, splits = to_split.pop()
         shape = shape_of(blob, grid, camera)
-        too_large = shape.width_m > params.max_width or shape.thickness_m > params.max_thickness
-        pieces = _split_between_heads(blob, grid) if shape.width_m > 2 * params.min_width else []
+        too_large = shape.width_m > MAX_WIDTH_M or shape.thickness_m > MAX_THICKNESS_M
+        pieces = _split_between_heads(blob, grid) if shape.width_m > 2 * MIN_WIDTH_M else []
         if too_large and not pieces:
             pieces = _split_in_depth(blob, grid)
         if pieces and splits < 4:
@@ -220,7 +217,7 @@ def _split_between_heads(blob, grid):
     return [piece for half in halves for piece in _connected(half, blob.row, blob.column)]
 
 
-def _merge_stacked(parts, grid, camera, params):
+def _merge_stacked(parts, grid, camera):
     """Merge parts at one depth and above each other, such as a person behind the arm of another person."""
     remaining = sorted(parts, key=lambda part: -part[0].mask.size)
     merged = []
@@ -229,19 +226,19 @@ def _merge_stacked(parts, grid, camera, params):
         blob = part
         for i in range(len(remaining) - 1, -1, -1):
             other, other_shape = remaining[i]
-            if _are_stacked(blob, shape, other, other_shape, params):
+            if _are_stacked(blob, shape, other, other_shape):
                 blob = _union(blob, other)
                 del remaining[i]
         merged.append((blob, shape if blob is part else shape_of(blob, grid, camera)))
     return merged
 
 
-def _are_stacked(blob, shape, other, other_shape, params):
+def _are_stacked(blob, shape, other, other_shape):
     columns = _overlap(blob.column, blob.mask.shape[1], other.column, other.mask.shape[1])
     rows = _overlap(blob.row, blob.mask.shape[0], other.row, other.mask.shape[0])
-    step_m = 0.2 + 2 * params.depth_step_growth * shape.depth_m ** 2
+    step_m = 0.2 + 2 * STEP_GROWTH_PER_M * shape.depth_m ** 2
     return (columns > 0.5 and rows < 0.3 and abs(shape.depth_m - other_shape.depth_m) < step_m
-            and max(shape.top_m, other_shape.top_m) < params.max_top)
+            and max(shape.top_m, other_shape.top_m) < MAX_TOP_M)
 
 
 def _overlap(start, length, other_start, other_length):
