@@ -35,6 +35,7 @@ CASES = [
         '/realsense_node/width': 848, '/realsense_node/height': 480, '/realsense_node/fps': 15,
         '/realsense_node/exposure': 0.008, '/realsense_node/publish_clock': False}),
     (OWN_DRIVER + 'camera:=front', {
+        'nodes': ['front_realsense_node'], '/front_realsense_node/frame_prefix': 'front',
         'front_realsense_node:camera/color/image_raw': 'front/color/image_raw',
         'front_realsense_node:camera/color/camera_info': 'front/color/camera_info',
         'front_realsense_node:camera/aligned_depth_to_color/image_raw': 'front/aligned_depth_to_color/image_raw',
@@ -151,9 +152,9 @@ def test_the_driver_aligns_depth_to_colour_of_the_same_size_and_rate(camera_pack
     assert parameters['/camera/rgb_camera/enable_auto_exposure'] is True
     assert parameters['/camera/rgb_camera/auto_exposure_priority'] is False
     parameters = dumped('realsense.launch', camera_package, 'camera:=front', 'serial_no:=0123', 'fps:=15',
-                        'width:=848', 'filters:=disparity,spatial', 'initial_reset:=true', 'exposure:=0.008')
+                        'width:=848', 'initial_reset:=true', 'exposure:=0.008')
     given = given_to_stand_ins(parameters)
-    assert given['camera'] == 'front' and given['filters'] == 'disparity,spatial' and given['initial_reset'] == 'true'
+    assert given['camera'] == 'front' and given['initial_reset'] == 'true'
     assert (given['color_width'], given['depth_width'], given['color_fps'], given['depth_fps']) == (
         '848', '848', '15', '15')
     assert given['serial_no'].lstrip('0') == '123'
