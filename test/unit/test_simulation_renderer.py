@@ -19,7 +19,7 @@ cameras = st.sampled_from([CAMERA, Camera(161, 119, 140, 150, 70, 66), Camera(99
 
 def pose(position, yaw=0.0, pitch=0.0, roll=0.0):
     """Transform from the camera to the world. The camera faces x if all angles are 0."""
-    matrix = mounted(0.0, *np.degrees((pitch, roll, yaw)))
+    matrix = mounted(0.0, *np.degrees((-pitch, roll, yaw)))
     matrix[:3, 3] = position
     return matrix
 
