@@ -122,7 +122,7 @@ def test_shipped_models_are_readable_and_the_thesis_one_is_published():
     assert np.sqrt(np.diag(model.covariance([0.5, 0, 2])))[[0, 2]] == pytest.approx([0.018, 0.0474])
 
 
-def test_a_model_is_for_its_estimator_or_for_any_if_it_is_of_recorded():
+def test_a_model_of_recorded_positions_is_for_any_estimator():
     for estimator in ('', 'recorded', 'foreground'):
         MODEL._replace(provenance=MODEL.provenance._replace(estimator=estimator)).check_estimator('foreground')
     with pytest.raises(ValueError, match='for the estimator median, not foreground'):
