@@ -122,6 +122,13 @@ def test_shipped_models_are_readable_and_the_thesis_one_is_published():
     assert np.sqrt(np.diag(model.covariance([0.5, 0, 2])))[[0, 2]] == pytest.approx([0.018, 0.0474])
 
 
+def test_a_model_of_recorded_positions_is_for_any_estimator():
+    for estimator in ('', 'recorded', 'foreground'):
+        MODEL._replace(provenance=MODEL.provenance._replace(estimator=estimator)).check_estimator('foreground')
+    with pytest.raises(ValueError, match='for the estimator median, not foreground'):
+        MODEL.check_estimator('foreground')
+
+
 def test_boxes_are_corrected_and_get_their_covariance():
     box = Box3D(np.array([0.5, 0.1, 2.0]), np.array([0.5, 1.7, 0.5]), (1, 2, 3, 4), 0.9, (False,) * 4)
     other = box._replace(center_m=np.array([-0.5, 0.0, 3.0]))

@@ -10,20 +10,17 @@ from ros_3d_bb_lab.simulation.body import Body, Build
 from ros_3d_bb_lab.simulation.mesh import box
 from ros_3d_bb_lab.simulation.renderer import render
 from ros_3d_bb_lab.simulation.room import FLOOR, RenderedRoom
+from support.cylinders import mounted
 
 BOUNDS, HEIGHT = (-3.0, 9.0, -4.0, 4.0), 2.8
 CAMERA = Camera(160, 120, 153.7, 153.7, 79.8, 60.5)
 cameras = st.sampled_from([CAMERA, Camera(161, 119, 140, 150, 70, 66), Camera(99, 133, 80, 90, 49, 60)])
-FORWARD = np.array([[0, 0, 1], [-1, 0, 0], [0, -1, 0]])  # optical frame of a camera that faces x
 
 
 def pose(position, yaw=0.0, pitch=0.0, roll=0.0):
     """Transform from the camera to the world. The camera faces x if all angles are 0."""
-    cy, sy, cp, sp, cr, sr = (f(angle) for angle in (yaw, pitch, roll) for f in (np.cos, np.sin))
-    turn = (np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]]).dot([[cp, 0, -sp], [0, 1, 0], [sp, 0, cp]])
-            .dot([[1, 0, 0], [0, cr, -sr], [0, sr, cr]]))
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = turn.dot(FORWARD), position
+    matrix = mounted(0.0, *np.degrees((-pitch, roll, yaw)))
+    matrix[:3, 3] = position
     return matrix
 
 

@@ -36,10 +36,10 @@ CASES = [
         '/realsense_node/exposure': 0.008, '/realsense_node/publish_clock': False}),
     (OWN_DRIVER + 'camera:=front', {
         'nodes': ['front_realsense_node'], '/front_realsense_node/frame_prefix': 'front',
-        'front_realsense_node:camera/color/image_raw': 'front/color/image_raw',
-        'front_realsense_node:camera/color/camera_info': 'front/color/camera_info',
-        'front_realsense_node:camera/aligned_depth_to_color/image_raw': 'front/aligned_depth_to_color/image_raw',
-        'front_realsense_node:camera/aligned_depth_to_color/camera_info': 'front/aligned_depth_to_color/camera_info'}),
+        'realsense_node:camera/color/image_raw': 'front/color/image_raw',
+        'realsense_node:camera/color/camera_info': 'front/color/camera_info',
+        'realsense_node:camera/aligned_depth_to_color/image_raw': 'front/aligned_depth_to_color/image_raw',
+        'realsense_node:camera/aligned_depth_to_color/camera_info': 'front/aligned_depth_to_color/camera_info'}),
     ('realsense.launch file:=/some/where.bag repeat:=true', {
         'nodes': ['realsense_node'], '/use_sim_time': True, '/realsense_node/file': '/some/where.bag',
         '/realsense_node/repeat': True, '/realsense_node/publish_clock': True}),
