@@ -35,7 +35,7 @@ class Publisher(object):
         return self.connections
 
 
-def immediate_worker(work, _on_error):
+def immediate_worker(work, _on_error, _most=1):
     """Replaces NewestWorker: works at once, and raises errors, which a worker would only count."""
     def offer(item):
         work(item)
@@ -88,6 +88,7 @@ def masterless(params=()):
         'ros_3d_bb.nodes.common.subscribers._inputs': [],
         'ros_3d_bb.nodes.common.diagnostics.NodeUpdater': mock.Mock(),
         'ros_3d_bb.nodes.common.detector_output.NewestWorker': immediate_worker,
+        'ros_3d_bb.nodes.people_node.NewestWorker': immediate_worker,
         'ros_3d_bb.nodes.tracker_node.NewestWorker': immediate_worker,
         'ros_3d_bb.nodes.bbox3d_node.NewestWorker': immediate_worker,
         'ros_3d_bb.nodes.bbox3d_node.patient_master': mock.Mock()}

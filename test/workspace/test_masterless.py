@@ -1,11 +1,21 @@
 """Nodes and process_bag publish the same messages for the same bag, whose images may be compressed."""
+import genpy
+import numpy as np
 import pytest
 from sensor_msgs.msg import CompressedImage
+from std_msgs.msg import Header
 
 from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.bag_writer import write_bag
-from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC
+from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.image_rotation import mounted_camera
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, TF_TOPIC, CameraFrame, messages_of
+from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg
+from ros_3d_bb.core.latest_worker import NewestWorker
+from ros_3d_bb.nodes import people_node, tracker_node
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
+from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
 from ros_3d_bb.nodes.people_node import PeopleNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
@@ -14,7 +24,8 @@ from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from support.bags import messages_in
 from support.compressed import compressed_fields, rewritten
-from support.masterless import published
+from support.masterless import masterless, published
+from support.ros import wait_until
 
 SCENE = {'duration': 1.5, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}]}
 
@@ -44,3 +55,27 @@ def test_process_bag_writes_the_messages_that_the_nodes_publish(bags, node_class
         expected = messages_in(bags[1], '/' + topic)['/' + topic]
         assert len(expected) == 15
         assert [str(message) for message in found[topic]] == [str(message) for message in expected]
+
+
+def test_the_other_parts_of_people_node_do_not_wait_for_late_transforms(monkeypatch):
+    """The detector would skip images meanwhile."""
+    monkeypatch.setattr(tracker_node, 'Transforms', lambda _wait_s: Transforms(wait_s=3.0))
+    camera, depth_mm = Camera(64, 48, 60.0, 60.0, 31.5, 23.5), np.full((48, 64), 2000, np.uint16)
+    late = []
+    with masterless({'detector': 'none'}) as connections:
+        monkeypatch.setattr(people_node, 'NewestWorker', NewestWorker)
+        PeopleNode()
+        for number in range(3):
+            header = Header(stamp=genpy.Time(1, number * 10 ** 8), frame_id='camera')
+            frame = CameraFrame(header, camera, np.zeros((48, 64, 3), np.uint8), DepthImage(depth_mm, 0.001),
+                                [('map', 'camera', mounted_camera(1.0, 0.0, 0))])
+            for topic, message in messages_of(frame):
+                if topic == TF_TOPIC:
+                    late.append(message)
+                elif topic in connections.subscribers:
+                    connections.send(topic, message)
+            connections.send(BOXES_TOPIC, boxes2d_to_msg([(20, 10, 40, 45)], header))
+        assert connections.publishers[BOXES3D_TOPIC].count == 3 and connections.publishers[TRACKS_TOPIC].count == 0
+        for message in late:
+            connections.send('/tf', message)
+        wait_until(lambda: connections.publishers[TRACKS_TOPIC].count == 3, 'tracks of each image')

@@ -1,25 +1,27 @@
 """Worker thread that processes only the newest input, for work that is slower than its input."""
+import collections
 import threading
 
 
 class NewestWorker(object):
-    """Calls `work(item)` in a separate thread, always with the newest item offered; older waiting items are dropped.
+    """Calls `work(item)` in a separate thread with the newest items offered, in order. At most `most` wait; older ones
+    are dropped.
 
     An exception of `work` is passed to `on_error`, and the thread continues with the next item.
     """
 
-    def __init__(self, work, on_error):
+    def __init__(self, work, on_error, most=1):
         self._work, self._on_error = work, on_error
         self._news = threading.Condition()
-        self._newest, self._waiting, self._stopped = None, False, False
+        self._waiting, self._stopped = collections.deque(maxlen=most), False
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
     def offer(self, item):
         """Offer an item without blocking. Returns whether it replaced an item that was still waiting."""
         with self._news:
-            replaced = self._waiting
-            self._newest, self._waiting = item, True
+            replaced = len(self._waiting) == self._waiting.maxlen
+            self._waiting.append(item)
             self._news.notify()
         return replaced
 
@@ -36,7 +38,7 @@ class NewestWorker(object):
                 self._news.wait_for(lambda: self._waiting or self._stopped)
                 if self._stopped:
                     return
-                item, self._newest, self._waiting = self._newest, None, False
+                item = self._waiting.popleft()
             try:
                 self._work(item)
             except Exception as error:  # one item must not end the thread

@@ -1,13 +1,16 @@
 """ROS node that detects, locates and tracks people: the nodes of the pipeline in one process."""
 from typing import NamedTuple
 
+import rospy
+
+from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.common.part import Part
 from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.subscribers import AT_ONCE
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
-
 from ros_3d_bb.nodes.yolov5_node import Yolov5Node
 
 DETECTORS = {'yolov5': ('yolov5_node/', Yolov5Node), 'depth': ('depth_detector_node/', DepthDetectorNode)}
@@ -32,7 +35,10 @@ class PeopleNode(object):
     def __init__(self):
         params, = read_params(PeopleNodeParams)
         tracker = TrackerNode(Part('tracker_node/', subscribes=False))
-        bbox3d = Bbox3dNode(Part('bbox3d_node/', tracker.transforms, tracker.on_boxes, monitors=False,
+        # In a thread of its own, as the detector must not wait for the transforms of the tracker.
+        worker = NewestWorker(tracker.on_boxes, lambda error: rospy.logerr('tracking failed: %s', error), AT_ONCE)
+        rospy.on_shutdown(worker.stop)
+        bbox3d = Bbox3dNode(Part('bbox3d_node/', tracker.transforms, worker.offer, monitors=False,
                                  subscribes=params.detector not in DETECTORS))
         if params.detector in DETECTORS:
             namespace, node = DETECTORS[params.detector]
