@@ -108,17 +108,19 @@ def test_the_box_of_a_person_extends_from_head_to_feet(height_m, x, z, camera, f
     assert 0.7 <= detections.scores[0] <= 1 and detections.classes.tolist() == [0]
 
 
-def test_people_are_detected_beside_the_axis_of_a_fisheye():
+@pytest.mark.parametrize('places_m', [[(-1.2, 2.5)], [(-2.4, 2.0), (-1.75, 2.0)]])
+def test_people_are_detected_beside_the_axis_of_a_fisheye(places_m):
+    """Two people side by side are not merged, although they are near each other in the image."""
     wide = Camera(1200, 900, 300, 300, 599.5, 449.5)
     fisheye = Camera(640, 480, 300, 300, 319.5, 239.5, 'equidistant', (0.0, 0.0, 0.0, 0.0))
     room = Room(1.0, wide)
-    person = room.person(-1.2, 2.5)
+    people = [room.person(x, z) for x, z in places_m]
     x, y = fisheye.rays(np.arange(fisheye.width), np.arange(fisheye.height)[:, None])
     rows = np.clip(np.rint(y * wide.fy + wide.cy), 0, wide.height - 1).astype(int)
     columns = np.clip(np.rint(x * wide.fx + wide.cx), 0, wide.width - 1).astype(int)
     room.color, room.depth_m, room.owner = (seen[rows, columns] for seen in (room.color, room.depth_m, room.owner))
     room.camera = fisheye
-    assert_boxes(room.detections().boxes, room.visible(person), 0.9)
+    assert_boxes(room.detections().boxes, [room.visible(person) for person in people], 0.8)
 
 
 @pytest.mark.parametrize('number', [100, 217, 246, 285])

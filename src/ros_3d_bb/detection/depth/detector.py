@@ -84,7 +84,7 @@ class DepthPeople(object):
         people = []
         for blob, shape in find_person_clusters(grid, camera, self._params):
             box = box_of(blob, shape, grid, camera, floor)
-            position_m = ((box[0] + box[2]) / 2.0 - camera.cx) / camera.fx * shape.depth_m, shape.depth_m
+            position_m = camera.rays((box[0] + box[2]) / 2.0, camera.cy)[0] * shape.depth_m, shape.depth_m
             last = self._last_at(position_m)
             if last is None and not is_standing(shape, self._params):
                 continue
