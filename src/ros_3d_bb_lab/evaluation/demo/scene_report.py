@@ -226,7 +226,7 @@ def write_report(bag_path, picture_path, color_topic=''):
 def main():
     """Run the command `scene_report`."""
     parser = argparse.ArgumentParser(prog='scene_report', description=__doc__)
-    parser.add_argument('bag', help='bag recorded by simulation.launch record:=..., or written by process_bag')
+    parser.add_argument('bag', help='bag with ros_3d_bb/tracks')
     parser.add_argument('picture', nargs='?', help='image file to write (default: the name of the bag with .png)')
     parser.add_argument('--color-topic', default='', metavar='TOPIC',
                         help='colour images in the bag, if their topic is not %s' % COLOR_TOPIC)
