@@ -18,9 +18,10 @@ from ros_3d_bb.detection.depth.person_clusters import (DepthPeopleParams, find_p
 MEAN_HEIGHT_M, MEAN_WIDTH_M = 1.7, 0.5  # assumed for people who are partly outside the image
 SURE_SCORE = 0.95  # no further HOG scores are evaluated from this score on
 MAX_HOG_AGE = 2  # number of further images for which the HOG score of a person is used
-# A person who was sure in an image continues with a lower score, as one who crouches, for so many images, of which one
-# without the person counts as several. Chosen: furniture has lower scores, and 75 images are 5 s of the demo.
-CONTINUED_SCORE, MAX_UNSURE, NOT_FOUND = 0.1, 75, 15
+# A person who was sure in so many images continues with a lower score, as one who crouches, for a number of images, of
+# which one without the person counts as several. Chosen: furniture has lower scores or is seldom sure; 75 images are
+# 5 s of the demo.
+LEAST_SURE, CONTINUED_SCORE, MAX_UNSURE, NOT_FOUND = 3, 0.1, 75, 15
 NEARER_M, HIDDEN_SHARE = 0.3, 0.5  # of a person who hides the legs of another one, and of the width of these; chosen
 MIN_DISTANCE_M = 0.35  # between the centres of two people; closer detections are one person
 
@@ -28,7 +29,8 @@ MIN_DISTANCE_M = 0.35  # between the centres of two people; closer detections ar
 class DepthDetection(NamedTuple):
     """A detected person: box (x1, y1, x2, y2), score 0..1, and position to the right and ahead of the camera.
 
-    The HOG score is that of `hog_age` images ago. The person was sure `unsure` images ago.
+    The HOG score is that of `hog_age` images ago. The person was sure in `sure` images, in the last one of them `unsure`
+    images ago.
     """
 
     box: Tuple[float, float, float, float]
@@ -36,7 +38,8 @@ class DepthDetection(NamedTuple):
     position_m: Tuple[float, float]
     hog: float
     hog_age: int
-    unsure: int = 0
+    sure: int
+    unsure: int
 
 
 class DepthPeople(object):
@@ -96,11 +99,11 @@ class DepthPeople(object):
                 score = person_score(features, hog, shape.cut_top)
                 if score >= SURE_SCORE:
                     break
-            unsure = 0
-            if score < self._params.min_score or not is_standing(shape, self._params):
-                unsure = last.unsure + 1 if last and score >= CONTINUED_SCORE else MAX_UNSURE + 1
-            if unsure <= MAX_UNSURE:
-                people.append(DepthDetection(box, score, position_m, hog, hog_age, unsure))
+            if score >= self._params.min_score and is_standing(shape, self._params):
+                sure = last.sure + 1 if last else 1
+                people.append(DepthDetection(box, score, position_m, hog, hog_age, sure, 0))
+            elif last and last.sure >= LEAST_SURE and last.unsure < MAX_UNSURE and score >= CONTINUED_SCORE:
+                people.append(DepthDetection(box, score, position_m, hog, hog_age, last.sure, last.unsure + 1))
         people = _without_repeated(people)
         self._last_people = people + self._lost(people)
         return _merged_detections([_completed(person, people, camera, floor) for person in people])
