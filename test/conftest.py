@@ -97,6 +97,18 @@ def weights(tmp_path_factory):
 
 
 @pytest.fixture(scope='session')
+def official_output(tmp_path_factory):
+    """A checkpoint, and the output of YOLOv5's own code for given images: (path, [(image, rows, values)]).
+
+    Without data: random weights in the official format, and a plain numpy forward pass.
+    """
+    from support import official_reference
+    if DATA:
+        return official_reference.recorded(DATA)
+    return official_reference.made(str(tmp_path_factory.mktemp('reference') / 'random.pt'))
+
+
+@pytest.fixture(scope='session')
 def reader(tmp_path_factory, weights):
     """Runs the commands of the README."""
     from support.reader import Reader

@@ -22,7 +22,7 @@ def write_synthetic_session(folder):
         x_m, z_m = PLACES_M[number // FRAMES_PER_PLACE]
         color, depth_mm, box = _image_of(x_m, z_m, random)
         frame = {'id': 'frame-%03d' % number, 'color': 'color/%03d.png' % number, 'depth': 'depth/%03d.png' % number,
-                 'box': box, 'estimate_mm': [1000 * x_m + random.normal(0, 5), 100, 1000 * z_m + random.normal(0, 10)],
+                 'box': box, 'estimate_mm': _median_by_loops(depth_mm, box),
                  'truth_mm': {'x': 1000 * x_m, 'z': 1000 * z_m}}
         cv2.imwrite(os.path.join(folder, frame['color']), color)
         cv2.imwrite(os.path.join(folder, frame['depth']), depth_mm)
@@ -48,3 +48,18 @@ def _image_of(x_m, z_m, random):
     depth_mm += random.normal(0, 8, depth_mm.shape)
     depth_mm[random.random_sample(depth_mm.shape) < 0.1] = 0
     return color, depth_mm.astype(np.uint16), box
+
+
+def _median_by_loops(depth_mm, box, stride=20):
+    """The thesis' estimate, written the slow way: nested loops, as its proof of concept."""
+    x1, y1, x2, y2 = box
+    columns, rows = -(-(x2 - x1) // stride), -(-(y2 - y1) // stride)
+    left = x1 + (x2 - x1 - (columns - 1) * stride - 1) // 2
+    top = y1 + (y2 - y1 - (rows - 1) * stride - 1) // 2
+    points = []
+    for v in range(top, y2, stride):
+        for u in range(left, x2, stride):
+            z = float(depth_mm[v, u])
+            if z > 0:
+                points.append(((u - CX) / FX * z, (v - CY) / FY * z, z))
+    return [float(np.median([point[axis] for point in points])) for axis in range(3)]

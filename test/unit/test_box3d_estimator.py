@@ -3,7 +3,6 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from conftest import DATA
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.object_classes import PERSON_CLASS
@@ -24,7 +23,6 @@ def flat(depth, scale_m=0.001, dtype=np.uint16):
     return DepthImage(np.full((48, 64), depth, dtype), scale_m)
 
 
-@pytest.mark.skipif(not DATA, reason='needs the recorded positions of the thesis')
 def test_the_median_reproduces_the_recorded_positions(session_folder):
     """Within 1 mm an axis, plus the rounding of the record to whole millimetres."""
     session = read_session(session_folder)

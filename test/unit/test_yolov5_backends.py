@@ -1,20 +1,19 @@
 """Inference backends: equal predictions, and errors for files and parameters that cannot be used."""
 import json
-import os
 import sys
 
-import cv2
 import numpy as np
 import pytest
 import torch
 
-from conftest import DATA
 from ros_3d_bb.detection.weights import WeightsError
 from ros_3d_bb.detection.yolov5 import backends, torch_backend
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime
 from ros_3d_bb.detection.onnx.decoders import decode_rows
 from support.checkpoints import random_network, supported, write_checkpoint
 from support.layouts import layout
+from support.official_reference import made
+
 
 needs_onnx = pytest.mark.needs('onnxruntime', 'onnx')
 ON_TORCH, ON_ONNX = RuntimeParams('torch', 'cpu', 1), RuntimeParams('onnxruntime', 'cpu', 1)
@@ -53,16 +52,15 @@ def exported_onnx(path, network, hw, metadata, dynamic=False):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not DATA, reason='needs the recorded output of the official code')
 @pytest.mark.parametrize('params', BOTH)
-def test_raw_output_agrees_with_the_official_code(params):
-    """Within 0.01 px and 1e-4 in every score."""
-    run = open_runtime(os.path.join(DATA, 'weights', 'yolov5n.pt'), params)
-    with np.load(os.path.join(DATA, 'weights', 'yolov5n_reference.npz')) as recorded:
-        for name in sorted(set(key.split('/')[0] for key in recorded.files)):
-            image = cv2.imread(os.path.join(DATA, 'data', 'thesis', 'color', name + '.png'))[..., ::-1]
-            difference = np.abs(run(image, -1)[recorded[name + '/rows']] - recorded[name + '/values'])
-            assert difference[:, :4].max() <= 0.01 and difference[:, 4:].max() <= 1e-4
+@pytest.mark.parametrize('random', [None, ('6.0', 'n'), ('5.0', 's')])
+def test_raw_output_agrees_with_the_official_code(tmp_path, official_output, random, params):
+    """Within 0.01 px and 1e-4 in every score; or, also for Focus and SPP of release 5.0, with a reference network."""
+    path, cases = made(str(tmp_path / 'random.pt'), layout(*random)) if random else official_output
+    run = open_runtime(path, params)
+    for image, rows, values in cases:
+        difference = np.abs(run(image, -1)[rows] - values)
+        assert difference[:, :4].max() <= 0.01 and difference[:, 4:].max() <= 1e-4
 
 
 @pytest.mark.parametrize('params', BOTH)

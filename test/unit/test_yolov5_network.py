@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 import torch
 
-from ros_3d_bb.detection.yolov5.network import Focus, Network
+from ros_3d_bb.detection.yolov5.network import Network
 from support.checkpoints import random_network
 from support.layouts import PUBLISHED_MILLIONS, layout
 
@@ -29,13 +29,6 @@ def test_output_has_a_row_for_each_anchor_of_each_cell(release, model, rows):
         np.testing.assert_allclose(network.fuse()(image).numpy(), output.numpy(), atol=1e-3, rtol=1e-4)
     assert output.shape == (1, rows, 8)
     assert torch.isfinite(output).all() and (output[..., 4:] > 0).all() and (output[..., 4:] < 1).all()
-
-
-def test_focus_has_the_order_of_release_5_0():
-    """Of each 2 x 2 pixels: both even, odd row, odd column, both odd."""
-    focus = Focus(1, 1)
-    focus.conv = torch.nn.Identity()
-    assert focus(torch.arange(16.0).view(1, 1, 4, 4))[0, :, 0, 0].tolist() == [0, 4, 1, 5]
 
 
 @pytest.mark.parametrize('change,named', [
