@@ -29,8 +29,8 @@ MIN_DISTANCE_M = 0.35  # between the centres of two people; closer detections ar
 class DepthDetection(NamedTuple):
     """A detected person: box (x1, y1, x2, y2), score 0..1, and position to the right and ahead of the camera.
 
-    The HOG score is that of `hog_age` images ago. The person was sure in `sure` images, in the last one of them `unsure`
-    images ago.
+    The HOG score is that of `hog_age` images ago. The person was sure in `sure` images, most recently `unsure` images
+    ago.
     """
 
     box: Tuple[float, float, float, float]
