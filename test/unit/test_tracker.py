@@ -44,15 +44,15 @@ def ids(objects):
 
 @pytest.mark.parametrize('rate_hz', [3, 5, 10, 20, 30, 60])
 def test_tracks_begin_and_end_after_the_same_time_at_any_rate(rate_hz):
-    """Boxes without a score. Below 12 Hz, the third one confirms the track."""
+    """Boxes without a score. Below 15 Hz, the second one confirms the track."""
     walk = play(Tracker(), 4, lambda time_s: [at(3, 0)] if time_s < 2 else [], rate_hz)
     published_s = [number / rate_hz for number, objects in enumerate(walk) if objects]
-    assert 0.07 <= published_s[0] <= max(0.14, 2.01 / rate_hz)
+    assert 0.06 <= published_s[0] <= max(0.11, 1.01 / rate_hz)
     assert 2.15 <= published_s[-1] <= max(2.45, 2 + 2.01 / rate_hz)
     assert len(published_s) == round((published_s[-1] - published_s[0]) * rate_hz) + 1
 
 
-@pytest.mark.parametrize('score,first', [(0.95, 3), (0.5, 3), (0.35, 7), (0.1, None), (0.02, None)])
+@pytest.mark.parametrize('score,first', [(0.95, 2), (0.5, 2), (0.35, 5), (0.1, None), (0.02, None)])
 def test_the_score_decides_when_a_track_is_published(score, first):
     published = [len(objects) for objects in play(Tracker(), 1, standing_with(score))]
     assert published == [0] * 30 if first is None else published == [0] * first + [1] * (30 - first)

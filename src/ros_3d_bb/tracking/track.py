@@ -19,12 +19,12 @@ from ros_3d_bb.tracking.types import (NOT_DETECTED, PREDICTION_STEP, PREDICTION_
                                       prediction_times_s)
 
 # All are chosen; `./run bench tracking` and `./run bench scenes` show the effect of others.
-HIT_CORRELATION_S = 0.08  # without scores, four images at 30 Hz or three independent ones confirm a track by default
+HIT_CORRELATION_S = 0.08  # without scores, three images at 30 Hz or two independent ones confirm a track by default
 MISS_CORRELATION_S = 0.15  # the causes of misses, such as poses and partial occlusion, last longer
 UNKNOWN_SCORE, LARGEST_SCORE = 0.5, 0.9999  # assumed if the score is unknown; upper bound, for its log odds
 # Of the score of a detection. A high score does not mean that the position is right, as of a person half hidden.
 MIN_LOG_ODDS, MAX_LOG_ODDS = -2.0, 1.0
-HIT = 0.4  # of a detection where a track is expected: little, because false detections repeat at their place, too
+HIT = 0.8  # of a detection where a track is expected: little, because false detections repeat at their place, too
 KNOWN_IMAGES = 4  # images that the expected rate of detections counts for, against the observed rate of a new track
 MAX_TRACK_SCORE = 4.0  # earlier evidence is forgotten: an undetected person is published for 0.4 s
 MIN_TRACK_SCORE = -2.0  # with less (12 % probability), tracks do not start, and undetected tracks are not published
