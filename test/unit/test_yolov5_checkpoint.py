@@ -101,7 +101,7 @@ def with_flipped_byte(content):
 
 
 @pytest.mark.parametrize('prepare, named', [
-    (lambda path, content: write(path, with_flipped_byte(content)), 'CRC'),
+    (lambda path, content: write(path, with_flipped_byte(content)), 'truncated'),
     (lambda path, content: write(path, b'Not Found'), 'zip'),
     (lambda path, content: write_checkpoint(path, LAYOUT, root='SegmentationModel'), 'SegmentationModel'),
     (lambda path, content: write_pickle(path, pickle.dumps({}, 2), zipfile.ZIP_DEFLATED), 'data.pkl is compressed'),
