@@ -64,6 +64,12 @@ def test_a_person_who_sits_down_stands_up_or_bends_keeps_the_id(rate_hz, heights
     assert len(ids(outputs)) == 1
 
 
+def test_a_person_who_crouches_and_is_missed_once_keeps_the_id():
+    def boxes_at(time_s):
+        return [] if 1.96 < time_s < 2.04 else [(3.0, 0.0, 1.7 if time_s < 2 else 1.3)]
+    assert len(ids(play(15, 4, boxes_at))) == 1
+
+
 @pytest.mark.parametrize('rate_hz', [3, 5, 10, 30])
 def test_a_person_found_in_every_second_image_is_published(rate_hz):
     outputs = play(rate_hz, 10, lambda time_s: [(3.0, 0.0)] if round(time_s * rate_hz) % 2 == 0 else [])

@@ -6,7 +6,8 @@ the association decides contested pairs by their likelihood.
 
 The reach is the distance that a person covers in the time between two images. It is measured from the latest box and
 not from the prediction, because the prediction overshoots where a person turns. A track without a box in the latest
-image has no such reach: the person may be occluded, and the box that of another one.
+image has no such reach, because the person may be occluded, and the box that of another one. If it was detected just
+before, only a box at the same place belongs to it, as of a person who crouches.
 """
 import math
 
@@ -22,6 +23,7 @@ BESIDE_M = 0.1  # difference of two boxes of a standing person
 RISING_MPS = 2.0  # of heads: people who sit down, stand up or bend are slower
 BESIDE_SIGMAS = 2.0  # difference of the heads of two boxes of a standing person, relative to `height_sigma`
 SETTLED_NS = NS // 2  # the velocity of a track is known this long after its first detection
+RECENT_NS = NS // 4  # a person who is missed for less may still be at the same place
 LONGEST_NS = NS  # between two images; chosen: after longer, anyone may be within reach
 
 
@@ -31,11 +33,12 @@ def match_manoeuvres(tracks, measurements, matches, latest_ns, stamp_ns, height_
     `matches` are those of the association, `latest_ns` is the stamp of the latest image of the camera. The velocities
     of the tracks become as uncertain as their motion to the measurement.
     """
-    seen = [track for track in tracks if max(latest_ns, stamp_ns - LONGEST_NS) <= track.last_ns < stamp_ns]
+    earliest_ns = max(min(latest_ns, stamp_ns - RECENT_NS), stamp_ns - LONGEST_NS)
+    seen = [track for track in tracks if earliest_ns <= track.last_ns < stamp_ns]
     matched = set(id(part) for match in matches for part in match)
 
     def is_within_reach(track, measurement):
-        return _is_within_reach(track, measurement, stamp_ns, height_sigma_m)
+        return _is_within_reach(track, measurement, stamp_ns, track.last_ns >= latest_ns, height_sigma_m)
 
     pairs = []
     for track in seen:
@@ -51,8 +54,8 @@ def match_manoeuvres(tracks, measurements, matches, latest_ns, stamp_ns, height_
     return pairs
 
 
-def _is_within_reach(track, measurement, stamp_ns, height_sigma_m):
-    """Whether the object of a track may be at a measurement."""
+def _is_within_reach(track, measurement, stamp_ns, may_move, height_sigma_m):
+    """Whether the object of a track, which stays where it is unless it `may_move`, may be at a measurement."""
     if track.kind.group != measurement.kind.group:
         return False
     elapsed_s, box = (stamp_ns - track.last_ns) / NS, LatestBox.of(measurement)
@@ -63,7 +66,7 @@ def _is_within_reach(track, measurement, stamp_ns, height_sigma_m):
         speed_mps = math.hypot(track.state.u, track.state.v) + TURNING_MPS
         rise_m = RISING_MPS * elapsed_s + BESIDE_SIGMAS * height_sigma_m
         is_similar = track.is_confirmed and abs(box.head_m - track.latest.head_m) < rise_m
-    return is_similar and _distance_m(track, box) < speed_mps * elapsed_s + BESIDE_M
+    return is_similar and _distance_m(track, box) < (speed_mps * elapsed_s if may_move else 0.0) + BESIDE_M
 
 
 def _distance_m(track, box):
