@@ -105,5 +105,5 @@ def test_the_truth_belongs_to_the_nearest_box_unless_one_was_selected(document):
     document.set_truths([1], 0.72, 2.9)
     assert document.measurements[1].person == 0
     document.choose_person(1, 1)
-    document.set_truths([1], 0.72, 2.9)  # nobody else can be there
+    document.set_truths([1], 0.72, 2.9)  # no other person can be there
     assert document.measurements[1].truths == {1: (0.72, None, 2.9)}

@@ -92,5 +92,5 @@ def test_a_pole_before_an_arm_does_not_occlude_the_person():
 
 @pytest.mark.parametrize('x,depth_mm,expected', [
     (0.9, 850, PRESENT), (0.6, 550, PRESENT), (0.9, 4000, VISIBLE), (0.9, 0, VISIBLE), (3, 2950, VISIBLE)])
-def test_a_person_too_near_is_expected_only_where_depth_shows_nobody(x, depth_mm, expected):
+def test_a_person_too_near_is_expected_only_where_depth_shows_no_one(x, depth_mm, expected):
     assert place(x, 0, with_depth(np.full((480, 640), depth_mm))) == expected

@@ -12,7 +12,7 @@ from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.bags.bag_writer import new_bag
 from ros_3d_bb.camera.image_rotation import mounted_camera, turns_for
 from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, IMAGE_KINDS, STATIC_TOPIC, TF_TOPIC,
-                                               info_of_images, uncompressed)
+                                               absolute, info_of_images, uncompressed)
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC
 from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.params import nearest_name
@@ -200,7 +200,7 @@ def process_bag(source, target, settings=Settings()):
         run, copy = BagRun(reader, settings, events), _copier(bag, settings)
         known = set(reader.topics) | _outputs_of(settings)
         for topic in settings.keep or ():
-            if '/' + topic not in known:
+            if absolute(topic) not in known:
                 events.note(NOT_KEPT, 'the bag has no topic /%s; did you mean %s?'
                             % (topic, nearest_name(topic, reader.topics)))
         for raw, outputs in run.outputs():

@@ -1,4 +1,4 @@
-"""Worker thread that processes only the newest input, for work that is slower than its input."""
+"""Worker thread that processes only the newest inputs, for work that is slower than its input."""
 import collections
 import threading
 

@@ -11,7 +11,7 @@ import rosgraph
 import rospy
 
 from ros_3d_bb.bags.bag_reader import BagError
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, absolute
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.diagnosis.checks import findings
 from ros_3d_bb.diagnosis.message_observer import observe_bag
@@ -57,7 +57,7 @@ def bag_findings(arguments):
 
     def name_of(topic):
         wanted = name_for(arguments.camera, topic)
-        return '/' + names.get(wanted, wanted).lstrip('/')
+        return absolute(names.get(wanted, wanted))
     try:
         seen = observe_bag(arguments.bag, name_of, arguments.target_frame or 'map', arguments.depth)
     except BagError as error:

@@ -128,7 +128,7 @@ def height_cost(track, measurement, sigma_m):
         return 0.0
     height_m, seen_m = track.size_m[2], measurement.size_m[2]
     if track.is_confirmed:
-        sigma_m *= math.sqrt(1 + 1 / track.hits)  # its height is the mean of so few boxes; others may be no people
+        sigma_m *= math.sqrt(1 + 1 / track.hits)  # error of the mean of its boxes; other tracks may be of false boxes
     higher_m = track.z_m + height_m / 2 - measurement.z - seen_m / 2
     top_cost = (higher_m / (HEAD_SIGMAS * sigma_m)) ** 2 / 2
     if not track.lower.hits or is_bottom_cut:

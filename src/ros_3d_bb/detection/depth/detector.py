@@ -18,9 +18,9 @@ from ros_3d_bb.detection.depth.person_clusters import (DepthPeopleParams, find_p
 MEAN_HEIGHT_M, MEAN_WIDTH_M = 1.7, 0.5  # assumed for people who are partly outside the image
 SURE_SCORE = 0.95  # no further HOG scores are evaluated from this score on
 MAX_HOG_AGE = 2  # number of further images for which the HOG score of a person is used
-# A person who was sure in so many images continues with a lower score, as one who crouches, for a number of images, of
-# which one without the person counts as several. Chosen: furniture has lower scores or is seldom sure; 75 images are
-# 5 s of the demo.
+# Hysteresis, as of the thresholds of Canny (1986): a person who was sure in so many images continues with a lower
+# score, as one who crouches, for a number of images, of which one without the person counts as several. Chosen:
+# furniture has lower scores or is seldom sure; 75 images are 5 s of the demo.
 LEAST_SURE, CONTINUED_SCORE, MAX_UNSURE, NOT_FOUND = 3, 0.1, 75, 15
 NEARER_M, HIDDEN_SHARE = 0.3, 0.5  # of a person who hides the legs of another one, and of the width of these; chosen
 MIN_DISTANCE_M = 0.35  # between the centres of two people; closer detections are one person
@@ -88,8 +88,8 @@ class DepthPeople(object):
         for blob, shape in find_person_clusters(grid, camera, self._params):
             box = box_of(blob, shape, grid, camera, floor)
             position_m = camera.rays((box[0] + box[2]) / 2.0, camera.cy)[0] * shape.depth_m, shape.depth_m
-            last = self._last_at(position_m)
-            if last is None and not is_standing(shape, self._params):
+            last, stands = self._last_at(position_m), is_standing(shape, self._params)
+            if last is None and not stands:
                 continue
             features = shape_features_of(blob.mask, blob.window(grid.ahead_m), shape.thickness_m)
             if person_score(features, BEST_HOG, shape.cut_top) < self._params.min_score:
@@ -99,7 +99,7 @@ class DepthPeople(object):
                 score = person_score(features, hog, shape.cut_top)
                 if score >= SURE_SCORE:
                     break
-            if score >= self._params.min_score and is_standing(shape, self._params):
+            if score >= self._params.min_score and stands:
                 sure = last.sure + 1 if last else 1
                 people.append(DepthDetection(box, score, position_m, hog, hog_age, sure, 0))
             elif last and last.sure >= LEAST_SURE and last.unsure < MAX_UNSURE and score >= CONTINUED_SCORE:
@@ -109,15 +109,14 @@ class DepthPeople(object):
         return _merged_detections([_completed(person, people, camera, floor) for person in people])
 
     def _last_at(self, position_m):
-        """The DepthDetection in the last image at a position; None without one."""
+        """The DepthDetection of the last people at a position; None without one."""
         return next((person for person in self._last_people
                      if _distance_m(person.position_m, position_m) < MIN_DISTANCE_M), None)
 
     def _lost(self, people):
         """The people of the last image who are not found again, and may be in the next one."""
         return [lost._replace(unsure=lost.unsure + NOT_FOUND, hog_age=MAX_HOG_AGE) for lost in self._last_people
-                if lost.unsure + NOT_FOUND < MAX_UNSURE and all(
-                    _distance_m(lost.position_m, person.position_m) >= 2 * MIN_DISTANCE_M for person in people)]
+                if lost.unsure + NOT_FOUND < MAX_UNSURE and not _is_beside(lost, people)]
 
     def _hog_scores(self, pyramid, window, last):
         """Yield HOG scores and their ages: that of the person in the last image, if any, then new ones."""
@@ -180,8 +179,12 @@ def _distance_m(one_m, other_m):
 def _without_repeated(people):
     """The DepthDetections without what is beside a sure one and may continue the same person, such as a chair."""
     sure = [person for person in people if not person.unsure]
-    return [person for person in people if not person.unsure or all(
-        _distance_m(person.position_m, other.position_m) >= 2 * MIN_DISTANCE_M for other in sure)]
+    return [person for person in people if not person.unsure or not _is_beside(person, sure)]
+
+
+def _is_beside(person, others):
+    """Whether a DepthDetection may be of the same person as one of the others."""
+    return any(_distance_m(person.position_m, other.position_m) < 2 * MIN_DISTANCE_M for other in others)
 
 
 def _merged_detections(people):

@@ -18,11 +18,12 @@ STEP_M, STEP_GROWTH_PER_M = 0.08, 0.006
 MIN_WIDTH_M, MAX_WIDTH_M = 0.2, 1.15  # of a person; the largest with the arms stretched out
 MAX_THICKNESS_M = 0.9  # along the line of sight: a long stride
 MAX_TOP_M, MAX_BOTTOM_M = 2.1, 0.8  # above the floor: of the head, and of the lowest visible part; legs may be hidden
-MIN_VISIBLE_M, MIN_VISIBLE_CUT_M = 0.9, 0.5  # height of the visible part; where the image ends below the head
+MIN_VISIBLE_M = 0.9  # height of the visible part of a standing person whose head is in the image
 MIN_CELLS = 20  # smaller clusters are ignored; a person 6 m away has about 300 cells
 HEADROOM_M = 0.15  # minimum depth of the valley between the heads of two people side by side
 HIP_M = 0.95  # lower peaks do not count: in an image cut above the hips, the legs of one person form a valley, too
-# Smallest height of the top and of the visible part of a person who crouches, sits or bends; chosen.
+# Smallest height of the top and of the visible part of a person who crouches or bends, the latter also where the image
+# ends below the head; chosen.
 LOW_TOP_M, LOW_VISIBLE_M = 0.7, 0.5
 TWO_LAYERS = 0.7  # between-class share of the variance of two depth layers; 0.64 for noise, 0.75 for a slanted wall
 
@@ -158,8 +159,7 @@ def _is_human(shape, params):
 
 def is_standing(shape, params):
     """Whether a blob of human size is as high as a standing person."""
-    visible_m = MIN_VISIBLE_CUT_M if shape.cut_top else MIN_VISIBLE_M
-    return shape.top_m - shape.bottom_m >= visible_m and (shape.cut_top or params.min_top <= shape.top_m)
+    return shape.cut_top or shape.top_m >= params.min_top and shape.top_m - shape.bottom_m >= MIN_VISIBLE_M
 
 
 def _connected(cells, row=0, column=0):
