@@ -14,7 +14,7 @@ from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.error_model import read_error_model, write_error_model
-from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE
+from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
 from support.two_cameras import START_NS, Rig, boxes
 
 PERIOD_NS = NS // 30
@@ -83,15 +83,17 @@ def test_a_person_behind_something_in_the_depth_image_is_occluded(rig):
     assert ids(result) == before and result.tracks[0].status == OCCLUDED
 
 
-@pytest.mark.parametrize('columns,expected', [((205, 235), 1), ((175, 205), 0)])
-def test_raw_depth_is_compared_from_where_its_camera_stands(monkeypatch, columns, expected):
-    """It stands 0.1 m to the left of the colour camera, and sees something in these columns, 1.5 m ahead."""
+@pytest.mark.parametrize('columns,cx,expected', [
+    ((205, 235), 212, [OCCLUDED]), ((175, 205), 212, []), ((0, 0), 500, [OUT_OF_VIEW])])
+def test_raw_depth_is_compared_from_where_its_camera_stands(monkeypatch, columns, cx, expected):
+    """It stands 0.1 m to the left of the colour camera, and sees something in these columns, 1.5 m ahead. With a
+    principal point beside its image, it does not see the person."""
     rig, beside = Rig(depth='raw'), transform_from((-0.1, 0, 0), (0, 0, 0, 1))
     lookup = rig.transforms.lookup
     monkeypatch.setattr(rig.transforms, 'lookup', lambda target, source, stamp: (
         beside if (target, source) == ('camera', 'depth') else lookup(target, source, stamp)))
     stamp_ns, _before = stand(rig)
-    rig.add_depth_camera_info(CameraInfo(width=424, height=240, K=[210, 0, 212, 0, 210, 120, 0, 0, 1]))
+    rig.add_depth_camera_info(CameraInfo(width=424, height=240, K=[210, 0, cx, 0, 210, 120, 0, 0, 1]))
     rig.add_camera_info(CameraInfo(width=64, height=48, K=[60, 0, 32, 0, 60, 24, 0, 0, 1]))
     depth_mm = np.full((240, 424), 4000, np.uint16)
     depth_mm[:, slice(*columns)] = 1500
@@ -99,7 +101,7 @@ def test_raw_depth_is_compared_from_where_its_camera_stands(monkeypatch, columns
         header = Header(stamp=time_from(stamp_ns + number * PERIOD_NS), frame_id='depth')
         rig.add_depth(fill_image(Image(header=header), depth_mm, '16UC1'), 0)
         result = rig.send(stamp_ns + number * PERIOD_NS, count=0)
-    assert len(result.tracks) == expected
+    assert [track.status for track in result.tracks] == expected
 
 
 def test_boxes_are_tracked_without_their_depth_image_if_it_is_invalid(rig):

@@ -228,23 +228,27 @@ class TrackingStage(object):
 
     def _view(self, header, fixed_from_camera, camera, camera_name):
         """Return the CameraView of boxes with this header, with intrinsics and depth if they are known."""
-        intrinsics, depth_at = self._intrinsics.get(camera), None
+        view = CameraView(fixed_from_camera, self._intrinsics.get(camera), camera_name)
         entry = self._depths[camera].matching(header.stamp.to_nsec(), int(self._params.stamp_tolerance * NS))
-        if intrinsics is not None and entry is not None:
-            depth_at = self._depth_at(*entry.value, intrinsics, camera, header.frame_id)
-        return CameraView(fixed_from_camera, intrinsics, camera_name, depth_at)
+        if view.intrinsics is None or entry is None:
+            return view
+        return self._with_depth(view, *entry.value, camera, header.frame_id)
 
-    def _depth_at(self, depth, depth_frame, intrinsics, camera, boxes_frame):
-        """Return `CameraView.depth_at` for a depth image; None if it cannot be used, which bbox3d_node reports."""
+    def _with_depth(self, view, depth, depth_frame, camera, boxes_frame):
+        """Return a CameraView with a depth image; without one that cannot be used, which bbox3d_node reports."""
+        intrinsics = view.intrinsics
         if camera not in self._registrations:
-            is_aligned = depth.values.shape == (intrinsics.height, intrinsics.width)
-            return functools.partial(depths_towards, intrinsics, depth) if is_aligned else None
+            if depth.shape != (intrinsics.height, intrinsics.width):
+                return view
+            return view._replace(depth_at=functools.partial(depths_towards, intrinsics, depth),
+                                 area_px=depth.measured_area())
         try:
             geometry = self._registrations[camera].geometry(depth, depth_frame, intrinsics,
                                                             self._params.camera_frame or boxes_frame)
         except ValueError:
-            return None
-        return functools.partial(_depths_from_beside, geometry, depth)
+            return view
+        return view._replace(depth_at=functools.partial(_depths_from_beside, geometry, depth),
+                             area_px=geometry.area_px)
 
     def _accept(self, stamp_ns, now_ns, camera):
         """Whether the stamp of boxes is consistent with those of the other cameras. Handles backward jumps in time, as

@@ -184,7 +184,8 @@ def _out_of_range(view, positions_m, sizes_m, distances_m, max_range_m):
 
 
 def _shares_in_image(view, positions_m, heights_m, bearings):
-    """Share (n,) of the axes of upright bodies inside the image, less a margin of `EDGE_RAD`, regardless of occlusion.
+    """Share (n,) of the axes of upright bodies inside the part of the image with depth, less a margin of `EDGE_RAD`,
+    regardless of occlusion.
 
     Points for which the lens distortion defines no pixel count as outside. Without intrinsics, the image shows
     everything ahead.
@@ -197,9 +198,10 @@ def _shares_in_image(view, positions_m, heights_m, bearings):
     in_front = points[..., 2] > 0
     points[..., 2][~in_front] = 1  # they have no pixel
     with np.errstate(invalid='ignore'):  # nan is outside
-        u, v = np.moveaxis(camera.project(points), -1, 0)
-        inside = np.abs(u - (camera.width - 1) / 2.0) <= camera.width / 2.0 - EDGE_RAD * camera.fx
-        inside &= np.abs(v - (camera.height - 1) / 2.0) <= camera.height / 2.0 - EDGE_RAD * camera.fy
+        pixels = camera.project(points)
+        low_px, high_px = np.reshape(view.area_px or (0, 0) + camera[:2], (2, 2)) - 0.5
+        margin_px = np.multiply(EDGE_RAD, (camera.fx, camera.fy))
+        inside = ((pixels >= low_px + margin_px) & (pixels <= high_px - margin_px)).all(axis=-1)
     return (in_front & inside).sum(axis=1) / len(AXIS_SAMPLES)
 
 
