@@ -71,5 +71,6 @@ def write_mean_network(path, input_shape=(1, 3, 96, 128), element=FLOAT, channel
     row = graph.node('Reshape', [graph.node('Concat', [mean, mean], axis=1),
                                  graph.constant(np.array([1, 1, 6], np.int64))])
     with open(str(path), 'wb') as stream:
-        stream.write(graph.model([('images', element, tuple(input_shape))], [(row, FLOAT, (1, 1, 6))], {}))
+        stream.write(graph.model([('images', element, tuple(input_shape))], [(row, FLOAT, (1, 1, 6))],
+                                 {'end2end': 'True'}))
     return str(path)

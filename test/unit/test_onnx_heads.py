@@ -57,6 +57,7 @@ def test_networks_that_suppress_are_known_by_their_metadata():
 
 @pytest.mark.parametrize('given, reason', [
     (dict(outputs=[]), 'first output'), (dict(outputs=[np.zeros((1, 77, 79))]), 'no known head'),
+    (dict(outputs=[np.full((1, 300, 6), 0.3)]), 'no known head'),  # boxes and scores of two classes
     (dict(names=['a', 'b']), '2 names for its 3 classes'), (dict(head='yolox'), 'cells of strides'),
     (dict(head='nanodet', outputs=[np.ones((1, 252, 35)) * 7], names=NAMES * 2), '35 columns')])
 def test_outputs_that_do_not_fit_are_rejected(given, reason):

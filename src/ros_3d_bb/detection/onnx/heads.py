@@ -135,7 +135,7 @@ def _head_of(output, input_hw, grid, metadata):
         if not is_probability(output[0, :, 4:]):  # the distributions of distances are before the softmax
             return 'nanodet' if len(grid) == 3 else 'nanodet-plus'
         return 'yolox-decoded' if output[0, :, 0].max() > input_hw[1] / 2 else 'yolox'
-    if columns == 6:
+    if columns == 6 and not (output[0, :, 5] % 1).any():  # class numbers; else scores, as of RT-DETR with two classes
         return 'end-to-end'
     raise ValueError('its outputs are those of no known head')
 
