@@ -68,6 +68,16 @@ def test_static_transforms_and_those_between_equal_frames_do_not_age():
         assert robot.forwarded(START_NS + 600 * NS, frame_id='/base_link') == 1.0
 
 
+def test_the_robot_has_moved_on_since_its_latest_pose():
+    """The person leaves 1.5 m: 0.25 m of the body, and the robot and the clearance, of 2.2 m."""
+    standing = track_at([2.2, 0, 0.9], [0, 0, 0], moving=False)
+    with robot_with(highest_speed=2.0) as robot:
+        robot.send_tf(START_NS)
+        robot.forwarded(START_NS + 4 * NS // 10, standing)
+        speed_mps = robot.limit()
+        assert 1.3 < (0.4 + 0.3) * speed_mps + speed_mps ** 2 / 2 <= 1.5
+
+
 def test_the_robot_stops_before_the_whole_length_of_a_bicycle():
     """Its length is 1.75 m, half of which, and the robot and the clearance, leave 1.175 m."""
     standing = track_at([2.5, 0, 0.5], [0, 0, 0], moving=False)

@@ -115,7 +115,8 @@ class FollowNode(object):
                 self._drive(around)
 
     def _drive(self, around):
-        linear, angular = self._follower.command(around.tracks, around.age_s, around.robot_from_tracks, PERIOD_S)
+        linear, angular = self._follower.command(around.tracks, around.age_s, around.robot_from_tracks, PERIOD_S,
+                                                  around.pose_age_s)
         if self._follower.person is None and not (linear or angular):
             self._stop()
             return

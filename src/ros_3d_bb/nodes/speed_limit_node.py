@@ -81,7 +81,7 @@ class SpeedLimitNode(object):
         with self._diagnostics.receiving('scans'):
             limits_m = message.range_min, message.range_max
             corners_m = blind_corners(message.ranges, limits_m, message.angle_min, message.angle_increment)
-            robot_from_laser = self._tracks.robot_from(message.header.frame_id)
+            robot_from_laser, _age_s = self._tracks.robot_from(message.header.frame_id)
             if robot_from_laser is not None:
                 self._corners_m = transform_points(robot_from_laser, corners_m)[:, :2]
                 self._scan_ns = stamp_of(message)
@@ -104,7 +104,8 @@ class SpeedLimitNode(object):
         if around is None:
             self._diagnostics.warn('no recent tracks', 'no recent tracks: the robot stands until there are some')
             return None
-        limit = highest_safe_speed(around.tracks, around.age_s, around.robot_from_tracks, velocity, self._safety)
+        limit = highest_safe_speed(around.tracks, around.age_s, around.robot_from_tracks, velocity, self._safety,
+                                   around.pose_age_s)
         return min(limit, self._limit_before_corners(velocity)) if self._params.use_scan else limit
 
     def _limit_before_corners(self, velocity):

@@ -210,8 +210,9 @@ class Follower(object):
         robot_m = _position_of(robot_from_tracks)
         self.person = self.selector.select(tracks, stamp_ns, robot_m, self._params)
 
-    def command(self, tracks, age_s, robot_from_tracks, step_s):
-        """Linear and angular velocity, a time `step_s` after the last ones, for tracks of the age `age_s`.
+    def command(self, tracks, age_s, robot_from_tracks, step_s, pose_age_s=0.0):
+        """Linear and angular velocity, a time `step_s` after the last ones, for tracks of the age `age_s` and a pose of
+        the age `pose_age_s`.
 
         Both are 0 once the robot stands and there is no person to follow.
         """
@@ -219,7 +220,7 @@ class Follower(object):
         if self.person is not None and all(track.id != self.person.id for track in tracks):
             tracks = list(tracks) + [self.person]
         limit = highest_safe_speed(tracks, age_s, robot_from_tracks, (max(wanted[0], SLOWEST_MPS), 0.0, wanted[1]),
-                                   self._safety)
+                                   self._safety, pose_age_s)
         params, (linear, angular) = self._params, self._velocity
         change = params.angular_acceleration * step_s
         self._velocity = (

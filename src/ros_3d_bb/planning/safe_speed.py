@@ -47,7 +47,7 @@ class CornerParams(NamedTuple):
         limits=(0.05, 10.0), live=(0.1, 1))
 
 
-def highest_safe_speed(tracks, age_s, robot_from_tracks, velocity, params):
+def highest_safe_speed(tracks, age_s, robot_from_tracks, velocity, params, pose_age_s=0.0):
     """Highest speed, m/s, from which the robot stops before the ellipses of all people in its way.
 
     The separation distance of ISO/TS 15066 (5.5.4), with the distance in which the robot stops, v T + v²/2a, on one
@@ -62,16 +62,18 @@ def highest_safe_speed(tracks, age_s, robot_from_tracks, velocity, params):
     age_s : float
         Time since the stamp of the tracks.
     robot_from_tracks : numpy.ndarray, (4, 4)
-        Current pose of the frame of the tracks.
+        Latest pose of the frame of the tracks.
     velocity : sequence of float
         Of the robot: along x, along y, and angular. Only the path counts, which is that straight ahead without a
         linear velocity.
     params : SafeSpeedParams
+    pose_age_s : float, optional
+        Time since that pose, in which the robot has moved on.
     """
     speed_mps, robot_m = params.highest_speed, np.linalg.inv(robot_from_tracks)[:3, 3]
     for track in sorted(tracks, key=lambda each: np.linalg.norm(each.position_m - robot_m)):  # the nearest limit most
         distances = functools.partial(_distances_to_person, track, age_s, robot_from_tracks, params)
-        speed_mps = min(speed_mps, _safe_speed(distances, velocity, params, speed_mps))
+        speed_mps = min(speed_mps, _safe_speed(distances, velocity, params, speed_mps, pose_age_s))
     return speed_mps
 
 
@@ -84,7 +86,7 @@ def speed_before_corners(corners_m, age_s, velocity, params, corner_params):
     speed_mps = params.highest_speed
     for corner_m in sorted(corners_m, key=np.linalg.norm):
         distances = functools.partial(_distances_to_corner, corner_m, age_s, params, corner_params.emerging_speed)
-        speed_mps = min(speed_mps, _safe_speed(distances, velocity, params, speed_mps))
+        speed_mps = min(speed_mps, _safe_speed(distances, velocity, params, speed_mps, age_s))
     return max(speed_mps, corner_params.corner_speed)
 
 
@@ -97,23 +99,25 @@ def limited_velocity(velocity, limit):
     return tuple([factor * part for part in velocity])
 
 
-def _safe_speed(distances_to, velocity, params, most_mps):
+def _safe_speed(distances_to, velocity, params, most_mps, pose_age_s):
     """Highest speed from which the robot stops before a place that is occupied then; any higher speed where it is more
     than `most_mps`. Only the times and the path until the robot stands after this speed are computed: their product,
     which is the cost, grows with its cube.
 
     `distances_to` is called with times (n,) and places (m, 2) and returns distances (n, m), which are at most 1 at
-    occupied places. Only those that decrease along the path count.
+    occupied places. Only those that decrease along the path count. The path begins where the robot was `pose_age_s`
+    ago; it has kept its speed since.
     """
     reaction_s, deceleration = params.reaction_time, params.deceleration
     braking_s = most_mps / deceleration
     ahead_s = np.arange(0, reaction_s + braking_s + TIME_STEP_S, TIME_STEP_S)
-    longest_m = most_mps * (reaction_s + braking_s / 2)
+    unbraked_s = pose_age_s + reaction_s
+    longest_m = most_mps * (unbraked_s + braking_s / 2)
     distances = distances_to(ahead_s, _path(velocity, np.arange(0, longest_m + 2 * PATH_STEP_M, PATH_STEP_M)))
     is_met = (distances <= 1) & (np.gradient(distances, axis=1) < 0)
     first = np.where(is_met.any(axis=1), is_met.argmax(axis=1), np.inf)
     free_m = np.maximum(first - 1, 0) * PATH_STEP_M
-    by_distance = np.sqrt((deceleration * reaction_s) ** 2 + 2 * deceleration * free_m) - deceleration * reaction_s
+    by_distance = np.sqrt((deceleration * unbraked_s) ** 2 + 2 * deceleration * free_m) - deceleration * unbraked_s
     by_time = deceleration * (ahead_s - TIME_STEP_S - reaction_s)  # slower robots stand before the person is there
     return float(np.maximum(by_distance, by_time).min())
 

@@ -32,13 +32,14 @@ class Tracks(NamedTuple):
 
 class TracksAround(NamedTuple):
     """Tracks with at least the widths of their classes (`with_class_widths`), with their stamp and frame, their age in
-    seconds, and the current pose of their frame in that of the robot, (4, 4)."""
+    seconds, the latest pose of their frame in that of the robot, (4, 4), and its age in seconds."""
 
     tracks: list
     stamp_ns: int
     frame_id: str
     age_s: float
     robot_from_tracks: Any
+    pose_age_s: float
 
 
 class LatestTracks(object):
@@ -100,25 +101,25 @@ class RobotTracks(LatestTracks):
         newest, age_s = self.newest()
         if newest is None:
             return None
-        robot_from_tracks = self.robot_from(newest.frame_id)
+        robot_from_tracks, pose_age_s = self.robot_from(newest.frame_id)
         if robot_from_tracks is None:
             return None
         tracks = with_class_widths(newest.tracks, self._classes)
-        return TracksAround(tracks, newest.stamp_ns, newest.frame_id, age_s, robot_from_tracks)
+        return TracksAround(tracks, newest.stamp_ns, newest.frame_id, age_s, robot_from_tracks, pose_age_s)
 
     def robot_from(self, frame_id):
-        """Return the current pose of a frame in that of the robot, (4, 4); None if it is unknown, or older than the
-        timeout."""
+        """Return the latest pose of a frame in that of the robot, (4, 4), and its age in seconds; None, 0 if it is
+        unknown, or older than the timeout."""
         try:
             robot_from_frame = self._transforms.latest(self._robot_frame, frame_id)
             age_s = self._transforms.age_of_latest(self._robot_frame, frame_id)
         except tf2_ros.TransformException as error:
             self._diagnostics.warn('no transform', 'no transform from %s to %s: %s; waiting for it'
                                    % (frame_id, self._robot_frame, error))
-            return None
+            return None, 0.0
         if age_s > self._timeout_s:
             self._diagnostics.warn('old transform', 'the latest transform from %s to %s is %.1f s old, more than '
                                    '~timeout (%g s); waiting for a newer one'
                                    % (frame_id, self._robot_frame, age_s, self._timeout_s))
-            return None
-        return robot_from_frame
+            return None, 0.0
+        return robot_from_frame, age_s
