@@ -41,3 +41,14 @@ def test_pixels_are_those_whose_points_lie_in_the_cylinder(place_m):
     expected = are_inside(transform_points(fixed_from_camera, points_m), cylinders) & (depth.values > 0)
     assert (pixels_inside(depth, CAMERA, fixed_from_camera, cylinders) == expected).all()
     assert expected.any() == (place_m in ((2.0, 0.3), (0.4, 0.1)))
+
+
+def test_lens_distortion_is_computed_once_for_all_images(monkeypatch):
+    """It takes longer than the rest."""
+    camera, calls, rays = CAMERA._replace(distortion_model='plumb_bob', distortion=(-0.1, 0, 0, 0, 0)), [], Camera.rays
+    monkeypatch.setattr(Camera, 'rays', lambda *arguments: calls.append(1) or rays(*arguments))
+    cylinders = cylinders_of([track_at([2, y, 0.85], [0, 0, 0]) for y in (-0.5, 0.5)], 0.0, MARGIN_M)
+    for depth_mm in (1800, 1900, 2000):
+        depth = DepthImage(np.full((48, 64), depth_mm, np.uint16), 0.001)
+        assert pixels_inside(depth, camera, transform_from((0, 0, 1), OPTICAL_ROTATION), cylinders).any()
+    assert len(calls) == 1

@@ -1,4 +1,6 @@
 """Which measurements of other sensors show tracked people. Metres."""
+import functools
+
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import transform_points
@@ -44,14 +46,19 @@ def scan_points(ranges_m, first_angle, step):
 def pixels_inside(depth, camera, fixed_from_camera, cylinders):
     """Which pixels of a DepthImage of a Camera show points in the cylinders of the fixed frame, bool (h, w)."""
     found = np.zeros(depth.shape, bool)
+    x, y = _rays_of(camera)
     for cylinder in cylinders:
-        rows, columns = _image_part(camera, np.linalg.inv(fixed_from_camera), cylinder)
-        part = np.ix_(np.arange(camera.height)[rows], np.arange(camera.width)[columns])
+        part = _image_part(camera, np.linalg.inv(fixed_from_camera), cylinder)
         depth_m = depth.values[part] * depth.scale_m
-        x, y = camera.rays(part[1], part[0])
-        points_m = np.stack((x * depth_m, y * depth_m, depth_m), axis=-1)
+        points_m = np.stack((x[part] * depth_m, y[part] * depth_m, depth_m), axis=-1)
         found[part] |= are_inside(transform_points(fixed_from_camera, points_m), [cylinder]) & (depth_m > 0)
     return found
+
+
+@functools.lru_cache(maxsize=4)
+def _rays_of(camera):
+    """`Camera.rays` of all pixels, (h, w) each. With lens distortion, they take much longer than the rest."""
+    return np.broadcast_arrays(*camera.rays(np.arange(camera.width), np.arange(camera.height)[:, np.newaxis]))
 
 
 def _image_part(camera, camera_from_fixed, cylinder):
