@@ -11,7 +11,7 @@ import numpy as np
 from ros_3d_bb.camera.depth_image import FARTHEST_M
 from ros_3d_bb.core.atomic_file import FILE_NAME, locked_update
 from ros_3d_bb.estimation.box3d import plausible
-from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named
+from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.sessions.session_reader import (Session, SessionError, camera_of, boxes_of_others, read_color,
                                                read_depth, read_description, session_errors)
 from ros_3d_bb_annotator.entries import (Edit, changed, detections_of, drawn, entry_at, grid_of, mark_entry,
@@ -91,7 +91,8 @@ class Document(object):
         if not any(detection.box_px == box_px and not detection.by_hand for detection in detections):
             others_px = boxes_of_others(box_px, others_px)  # a box by hand replaces those of the same person
         depth = self.depth(index) if depth is None else depth
-        boxes = estimate_boxes(depth, [box_px] + list(others_px), self.camera, estimator_named(ESTIMATOR))
+        boxes = estimate_boxes(depth, [box_px] + list(others_px), self.camera, estimator_named(ESTIMATOR),
+                               level_rotation(self.measurements[index].up))
         return plausible(boxes[0])
 
     def errors(self, index):

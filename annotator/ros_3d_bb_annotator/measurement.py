@@ -2,6 +2,8 @@
 import os
 from typing import NamedTuple, Optional, Tuple
 
+import numpy as np
+
 from ros_3d_bb.sessions.session_reader import RecordedDetection, SessionError, frame_of, session_errors
 
 NEW, ANNOTATED, REJECTED, NOBODY = 'new', 'annotated', 'rejected', 'nobody found'
@@ -33,6 +35,7 @@ class EditedMeasurement(NamedTuple):
     truth_m: Optional[Tuple[float, Optional[float], float]] = None
     rejected: Optional[str] = None
     problem: Optional[str] = None
+    up: Optional[np.ndarray] = None
 
     @property
     def state(self):
@@ -106,4 +109,4 @@ def measurement_of(folder, entry, files):
     return EditedMeasurement(
         frame.id, frame.color_path, frame.depth_path, str(entry.get('stamp') or ''), frame.label, frame.detections,
         frame.person if frame.detections else None, truth_of(frame), frame.rejected,
-        'there is no file %s' % ' and no file '.join(missing) if missing else None)
+        'there is no file %s' % ' and no file '.join(missing) if missing else None, frame.up)

@@ -75,12 +75,14 @@ def images_in(path, topics):
 def session_images(session, rate_hz=30.0, mount_m=MOUNT_M, with_boxes=False):
     """Yield the images of a measurement session for `write_bag`, optionally with their 2D boxes.
 
-    `mount_m` is the position of the forward-facing camera in base_link (x forward, y left, z up), metres. Raises
-    SessionError if an image cannot be read.
+    `mount_m` is the position of the forward-facing camera in base_link (x forward, y left, z up), metres. It is tilted
+    as in the session. Raises SessionError if an image cannot be read.
     """
-    chain = [('map', 'odom', np.eye(4)), ('odom', 'base_link', np.eye(4)),
-             ('base_link', session.frame_id, transform_from(mount_m, OPTICAL_ROTATION))]
     for number, frame in enumerate(session.frames):
+        base_from_camera = transform_from(mount_m, OPTICAL_ROTATION)
+        base_from_camera[:3, :3] = base_from_camera[:3, :3].dot(frame.level_from_camera)
+        chain = [('map', 'odom', np.eye(4)), ('odom', 'base_link', np.eye(4)),
+                 ('base_link', session.frame_id, base_from_camera)]
         stamp_ns = START_NS + int(number * NS / rate_hz)
         header = Header(stamp=time_from(stamp_ns), frame_id=session.frame_id)
         messages = list(messages_of(CameraFrame(header, session.camera, read_color(frame, session.camera),

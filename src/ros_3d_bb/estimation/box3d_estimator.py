@@ -150,9 +150,11 @@ def check_rect(rect_px):
 def level_rotation(up):
     """Rotation (3, 3) from the optical frame to the level frame, given the unit vector `up` (3,) in the optical frame.
 
-    It is `LEVEL` if the camera points so steeply up or down, or is rolled so far, that people do not stand upright in
-    the image (`MAX_TILT_RAD`, `MAX_ROLL_RAD`).
+    It is `LEVEL` if `up` is None, unknown, or the camera points so steeply up or down, or is rolled so far, that people
+    do not stand upright in the image (`MAX_TILT_RAD`, `MAX_ROLL_RAD`).
     """
+    if up is None:
+        return LEVEL
     down = -np.asarray(up, float)
     if abs(down[2]) > np.sin(MAX_TILT_RAD) or down[1] < np.cos(MAX_ROLL_RAD) * np.hypot(down[0], down[1]):
         return LEVEL

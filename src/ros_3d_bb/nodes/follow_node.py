@@ -116,7 +116,7 @@ class FollowNode(object):
 
     def _drive(self, around):
         linear, angular = self._follower.command(around.tracks, around.age_s, around.robot_from_tracks, PERIOD_S,
-                                                  around.pose_age_s)
+                                                 around.pose_age_s)
         if self._follower.person is None and not (linear or angular):
             self._stop()
             return

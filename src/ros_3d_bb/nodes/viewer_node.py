@@ -7,14 +7,15 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import rospy
+import tf2_ros
 from sensor_msgs.msg import Image, Joy
 from std_msgs.msg import Empty, Int32MultiArray
 from std_srvs.srv import SetBool, Trigger, TriggerResponse
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
-from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, boxes2d_from_msg, camera_from_msg,
-                                                   stamp_if_any, stamp_of, time_from, usable_boxes3d)
+from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, NEWEST, boxes2d_from_msg,
+                                                   camera_from_msg, stamp_if_any, stamp_of, time_from, usable_boxes3d)
 from ros_3d_bb.core.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, arrival_clock_ns
 from ros_3d_bb.msg import BoundingBox3DArray
@@ -22,6 +23,7 @@ from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.label import Label
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscribe_camera_info
+from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.sessions.burst import Burst
 from ros_3d_bb.sessions.snapshots import ColorImage, Snapshots
 from ros_3d_bb.sessions.session_writer import append, remove
@@ -43,6 +45,7 @@ class ViewerParams(NamedTuple):
     label: str = Param('')
     window: bool = Param(True)
     frame_id: str = Param('')
+    floor_frame: str = Param('base_link')
     depth_scale: float = DEPTH_SCALE
     cache_length: float = Param(
         1.0, 'How long images wait for their boxes. If boxes take longer, the images are shown and stored without.',
@@ -82,6 +85,10 @@ class ViewerNode(object):
         Starts the timer, as the key `t` does: a countdown and a burst of measurements. A second message cancels it.
     joy : sensor_msgs/Joy
         Joystick, such as a presenter on the floor mark: a button starts the timer.
+    /tf : tf2_msgs/TFMessage
+        Transform from ~floor_frame to the camera, whose tilt is stored; not used if ~floor_frame is empty.
+    /tf_static : tf2_msgs/TFMessage
+        As /tf.
 
     Services
     --------
@@ -104,6 +111,7 @@ class ViewerNode(object):
         self._window = Window('ros_3d_bb viewer') if self._params.window else None
         self._snapshots = Snapshots(int(self._params.cache_length * NS), int(self._params.stamp_tolerance * NS),
                                     self._on_lost)
+        self._transforms = Transforms(wait_s=0) if self._params.floor_frame else None
         self._lock, self._capture_lock = threading.Lock(), threading.Lock()
         self._rate, self._received_topics, self._answer = FrameRate(), set(), ''
         self._captured_ns, self._is_warned, self._is_paused = None, False, False
@@ -209,6 +217,7 @@ class ViewerNode(object):
         if not self._params.session:
             raise ValueError('no session is given; start the viewer with session:=FOLDER')
         snapshot = self._snapshot_to_store()
+        snapshot = snapshot._replace(up=self._up_in(snapshot.color.frame_id))
         label = self._label.from_master()
         name, count = append(self._params.session, snapshot, label)
         self._captured_ns = snapshot.stamp_ns
@@ -217,6 +226,15 @@ class ViewerNode(object):
                  'with %d 3D box%s' % (len(snapshot.boxes3d), '' if len(snapshot.boxes3d) == 1 else 'es'))
         return 'saved %s %s%s: number %d in %s' % (name, found, label and ', label %s' % label, count,
                                                    self._params.session)
+
+    def _up_in(self, frame_id):
+        """Return the unit vector (3,) that points up, in a frame; None if it is unknown."""
+        if self._transforms is None:
+            return None
+        try:
+            return self._transforms.lookup(frame_id, self._params.floor_frame, NEWEST)[:3, 2]
+        except tf2_ros.TransformException:  # bbox3d_node reports it
+            return None
 
     def _snapshot_to_store(self):
         """Return the newest snapshot.

@@ -9,10 +9,12 @@ from ros_3d_bb.core.object_classes import read_object_classes
 from ros_3d_bb.core.params import (CLASSES_FILE, DEPTH, DEPTH_SCALE, IMAGE_ROTATION, LARGEST, STAMP_TOLERANCE, Param,
                                    parameters)
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.box3d import LEVEL
 from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, error_model_of_param
 from ros_3d_bb.estimation.scale_check import ScaleCheck
+
+# A camera that is fixed to the robot has the same tilt in each image.
+_level_rotation = functools.lru_cache(maxsize=16)(level_rotation)
 
 
 @parameters()
@@ -135,12 +137,6 @@ class EstimationStage(object):
                 self._events.warn('boxes rejected', '2D %s; the others in this image are used' % error)
         return boxes2d._replace(boxes=boxes2d.boxes[usable], labels=[boxes2d.labels[number] for number in usable],
                                 scores=boxes2d.scores[usable])
-
-
-@functools.lru_cache(maxsize=16)  # a camera that is fixed to the robot has the same tilt in each image
-def _level_rotation(up):
-    """`box3d_estimator.level_rotation`; `LEVEL` if the tilt is unknown (`up` is None)."""
-    return LEVEL if up is None else level_rotation(up)
 
 
 def _as_received(boxes3d, frame):

@@ -18,6 +18,7 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.camera.distortion import PLUMB_BOB
 from ros_3d_bb.core.atomic_file import FILE_NAME
 from ros_3d_bb.detection.boxes import iou
+from ros_3d_bb.estimation.box3d_estimator import level_rotation
 
 SAME_PERSON_IOU = 0.3  # low, because a detector may find half of a body; boxes of two people seldom overlap so much
 
@@ -49,7 +50,8 @@ class Measurement(NamedTuple):
 
     `person` is the index of the detection that the ground truth belongs to; `truth_m` (x, z) and `truth_y_m` are in the
     optical frame; None if not annotated. `rejected` is the reason why the measurement is excluded, or None. `stamp_ns`
-    is the stamp of the image, or None if not stored.
+    is the stamp of the image, or None if not stored. `up` is the unit vector that points up, in the optical frame, or
+    None if unknown.
     """
 
     id: str
@@ -62,6 +64,12 @@ class Measurement(NamedTuple):
     rejected: Optional[str] = None
     stamp_ns: Optional[int] = None
     label: str = ''
+    up: Optional[np.ndarray] = None
+
+    @property
+    def level_from_camera(self):
+        """As from `box3d_estimator.level_rotation`."""
+        return level_rotation(self.up)
 
     @property
     def boxes_px(self):
@@ -188,7 +196,7 @@ def frame_of(folder, entry):
         str(entry['id']), os.path.join(folder, entry['color']), os.path.join(folder, entry['depth']),
         tuple(_detection_from(detection) for detection in detections), person, *_truth_from(truth_mm),
         str(entry['rejected']) if entry.get('rejected') else None, None if stamp is None else _stamp_ns_from(stamp),
-        str(entry.get('label', '')))
+        str(entry.get('label', '')), _up_from(entry.get('up')))
 
 
 def read_color(frame, camera):
@@ -247,6 +255,15 @@ def _truth_from(truth_mm):
         return None, None
     y_mm = truth_mm.get('y')
     return _metres([truth_mm['x'], truth_mm['z']], 2), None if y_mm is None else float(_metres([y_mm], 1)[0])
+
+
+def _up_from(values):
+    if values is None:
+        return None
+    up = _numbers(values, 3)
+    if not up.any():
+        raise ValueError('up is %s; a direction in the optical frame expected' % values)
+    return up / np.linalg.norm(up)
 
 
 def _stamp_ns_from(text):

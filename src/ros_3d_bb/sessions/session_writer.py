@@ -44,6 +44,8 @@ def append(folder, snapshot, label=''):
                      'stamp': '%d.%09d' % divmod(snapshot.stamp_ns, NS), 'detections': _detections(snapshot)}
             if label:
                 entry['label'] = label
+            if snapshot.up is not None:
+                entry['up'] = snapshot.up.round(6).tolist()
             for kind, pixels in (('color', snapshot.color.pixels[..., ::-1]), ('depth', depth.values)):
                 path = os.path.join(folder, entry[kind])
                 atomic_write(path, _png(pixels))

@@ -20,7 +20,7 @@ class Snapshot(NamedTuple):
     """Images, camera and boxes of one stamp, as they were added.
 
     `depth` is aligned to `color`. `boxes2d` are the 2D boxes (x1, y1, x2, y2), and `boxes3d` those estimated from them,
-    of which some may be missing. Boxes that have not arrived are None.
+    of which some may be missing. Boxes that have not arrived are None. `up` is as of `session_reader.Measurement`.
     """
 
     stamp_ns: int
@@ -29,6 +29,7 @@ class Snapshot(NamedTuple):
     camera: Camera
     boxes2d: Optional[Tuple[Tuple[int, int, int, int], ...]]
     boxes3d: Optional[Tuple[Box3D, ...]]
+    up: Optional[np.ndarray] = None
 
 
 class Snapshots(object):

@@ -70,7 +70,8 @@ def _raw_positions(session, boxes, estimator):
     for number, (frame, rect_px) in enumerate(zip(session.frames, boxes)):
         if rect_px is not None:
             rects_px = [rect_px] + list(frame.boxes_px[1:])
-            box = estimate_boxes(read_depth(frame, session), rects_px, session.camera, estimator)[0]
+            box = estimate_boxes(read_depth(frame, session), rects_px, session.camera, estimator,
+                                 frame.level_from_camera)[0]
             raw_m[number] = box.center_m if plausible(box) else np.nan
     return raw_m
 

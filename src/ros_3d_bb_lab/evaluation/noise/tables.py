@@ -170,7 +170,8 @@ def _estimate(frame, session, name):
     """Position (3,) of the annotated person of a frame, whose box is the first one, or None."""
     if name == RECORDED:
         return frame.estimate_m
-    boxes = estimate_boxes(read_depth(frame, session), frame.boxes_px, session.camera, estimator_named(name))
+    boxes = estimate_boxes(read_depth(frame, session), frame.boxes_px, session.camera, estimator_named(name),
+                           frame.level_from_camera)
     return boxes[0].center_m if boxes and plausible(boxes[0]) else None
 
 
