@@ -3,7 +3,7 @@ import pytest
 
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.bags.process_bag import with_params
-from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, TRACKS_TOPIC, boxes3d_from_msg, tracks_from_msg
+from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, TRACKS_TOPIC, tracks_from_msg, usable_boxes3d
 from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.pipeline.people_pipeline import CollectedResults, PeoplePipeline, Settings
 from ros_3d_bb_lab.evaluation.clear_mot import Moment, score
@@ -50,7 +50,7 @@ def test_tracks_name_the_box_that_they_were_detected_as(run):
     detected = 0
     for _truth, boxes3d, tracks in run:
         assert boxes3d.header.stamp == tracks.header.stamp
-        boxes = boxes3d_from_msg(boxes3d)
+        boxes, _faults = usable_boxes3d(boxes3d)
         indices = [track.detection for track in tracks.objects if track.detection >= 0]
         assert len(set(indices)) == len(indices)
         for track in tracks.objects:

@@ -121,9 +121,9 @@ class StampSynchronizer(object):
     assumed_delay_ns : int
         Latency of the detector, for boxes without a stamp; also an attribute.
     on_frame : callable
-        Called with boxes, depth and camera of one stamp.
+        Called with boxes and depth, both Stamped, and camera of one frame.
     on_lost : callable
-        Called with unmatched boxes, and whether they are lost because time jumped back.
+        Called with unmatched boxes, Stamped, and whether they are lost because time jumped back.
     """
 
     def __init__(self, length_ns, tolerance_ns, assumed_delay_ns, on_frame, on_lost):
@@ -178,15 +178,15 @@ class StampSynchronizer(object):
         if stamp_ns is None:
             depth = self._depths.arrived_at(now_ns - self.assumed_delay_ns, self._length_ns)
             stamp_ns = None if depth is None else depth.stamp_ns
-        newest_ns = self._depths.newest_ns
+        entry, newest_ns = Stamped(stamp_ns, now_ns, boxes), self._depths.newest_ns
         if stamp_ns is None:
             self._match_waiting(now_ns)
-            self._on_lost(boxes, False)
+            self._on_lost(entry, False)
         elif newest_ns is not None and newest_ns + self._length_ns < stamp_ns <= self._end_before_ns:
-            self._on_lost(boxes, True)  # boxes from before the time jump
+            self._on_lost(entry, True)  # boxes from before the time jump
             self._match_waiting(now_ns)
         else:
-            self._waiting.append(Stamped(stamp_ns, now_ns, boxes))
+            self._waiting.append(entry)
             self._match_waiting(now_ns)
 
     def end(self):
@@ -196,7 +196,7 @@ class StampSynchronizer(object):
     def _lose_waiting(self, before_jump):
         lost, self._waiting = self._waiting, []
         for entry in lost:
-            self._on_lost(entry.value, before_jump)
+            self._on_lost(entry, before_jump)
 
     def _match_waiting(self, now_ns):
         """Call the callbacks for boxes whose frame is complete, is lost, or did not arrive in time."""
@@ -212,7 +212,7 @@ class StampSynchronizer(object):
             is_late = now_ns - entry.arrival_ns > self._length_ns
             is_crowded = len(self._waiting) - number > MAX_WAITING
             if camera is not None or is_lost or is_late or is_crowded:
-                settled.append((entry.value, depth, camera))
+                settled.append((entry, depth, camera))
             else:
                 waiting.append(entry)
         self._waiting = waiting
@@ -220,7 +220,7 @@ class StampSynchronizer(object):
             if camera is None:
                 self._on_lost(boxes, False)
             else:
-                self._on_frame(boxes, depth.value, camera)
+                self._on_frame(boxes, depth, camera)
 
     def _camera_at(self, stamp_ns):
         """The camera of the boxes, or the nearest one as soon as a newer message shows that its own is lost."""

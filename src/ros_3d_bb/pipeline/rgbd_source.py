@@ -103,11 +103,12 @@ class RgbdSource(object):
         """
         received = imgmsg_to_depth(depth_msg, self._params.depth_scale, check_unit=True)
         depth, frame_id = self._aligned(received, depth_msg.header.frame_id, camera)
-        depth_stamp_ns, stamp_ns = depth_msg.header.stamp.to_nsec(), _stamp_ns(trigger)
-        if stamp_ns is None:
-            stamp_ns = depth_stamp_ns
-        color = None if isinstance(trigger, Boxes2D) else imgmsg_to_rgb(trigger)
-        size = trigger.image_size if color is None else color.shape[1::-1]
+        depth_stamp_ns = depth_msg.header.stamp.to_nsec()
+        if isinstance(trigger, Boxes2D):
+            color, size, stamp_ns = None, trigger.image_size, trigger.stamp_ns or depth_stamp_ns
+        else:
+            color = imgmsg_to_rgb(trigger)
+            size, stamp_ns = color.shape[1::-1], trigger.header.stamp.to_nsec()
         if size not in (None, (camera.width, camera.height)):
             raise ValueError('the colour image has %d x %d pixels, its camera_info on %s is for %d x %d: remap the '
                              'camera_info of this image' % (size + (self._info_topic, camera.width, camera.height)))
@@ -142,23 +143,22 @@ class RgbdSource(object):
                                   % (self._params.floor_frame, frame_id, error))
             return None
 
-    def _on_frame(self, trigger, depth_msg, camera):
+    def _on_frame(self, trigger, depth, camera):
         """Pass matched messages on, but only once if a depth image is nearest to several colour images: positions have
         its stamp."""
-        depth_stamp_ns = stamp_of(depth_msg)
-        if depth_stamp_ns == self._used_ns and _stamp_ns(trigger) not in (None, depth_stamp_ns):
+        if depth.stamp_ns == self._used_ns and trigger.stamp_ns != depth.stamp_ns:
             self._events.count('images with a used depth image')
             return
-        self._used_ns = depth_stamp_ns
-        self._on_match(trigger, depth_msg, camera)
+        self._used_ns = depth.stamp_ns
+        self._on_match(trigger.value, depth.value, camera)
 
     def _on_lost(self, trigger, before_jump):
-        inputs, stamp_ns = '2D boxes' if isinstance(trigger, Boxes2D) else 'colour images', _stamp_ns(trigger)
+        inputs = '2D boxes' if isinstance(trigger.value, Boxes2D) else 'colour images'
         if before_jump:
             self._events.count('%s from before a time jump' % inputs)
             return
         with self._events.rejecting(inputs):
-            raise ValueError(self._why_lost(stamp_ns))
+            raise ValueError(self._why_lost(trigger.stamp_ns))
 
     def _why_lost(self, stamp_ns):
         """Return an error message that names the missing input and its topic."""
@@ -176,8 +176,3 @@ class RgbdSource(object):
                     % (stamp_ns / NS, self._depth_topic, newest_ns / NS, self._cache_s, too_old_s))
         return ('no depth image with their stamp %.3f received on %s: %s'
                 % (stamp_ns / NS, self._depth_topic, self._sync.gap_text(stamp_ns)))
-
-
-def _stamp_ns(trigger):
-    """Stamp of a colour image, or of the one that 2D boxes are in; None if these have no stamp."""
-    return trigger.stamp_ns if isinstance(trigger, Boxes2D) else stamp_of(trigger)
