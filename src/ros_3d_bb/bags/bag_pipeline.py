@@ -11,7 +11,7 @@ from ros_3d_bb.bags.bag_reader import BagError, BagReader, Raw, message_in
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.bags.bag_writer import new_bag
 from ros_3d_bb.camera.image_rotation import mounted_camera, turns_for
-from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, IMAGE_KINDS, STATIC_TOPIC, TF_TOPIC,
+from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, IMAGE_KINDS, RAW, STATIC_TOPIC, TF_TOPIC,
                                                absolute, info_of_images, uncompressed)
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC
 from ros_3d_bb.core.event_counter import EventCounter
@@ -19,7 +19,6 @@ from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.yolov5.backends import open_detector
 from ros_3d_bb.pipeline.camera_pose import FLOOR, POSE_FITTED, POSE_TEXT, CameraPoseStage
-from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.detection_stage import CameraRotation, detect_in_color
 from ros_3d_bb.pipeline.people_pipeline import (DEPTH_INFO_TOPIC, INFO_TOPIC, INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA,
                                                 CollectedResults, PeoplePipeline, Settings)

@@ -1,7 +1,7 @@
 """Rotation of images by quarter turns, for cameras that are mounted in portrait orientation or upside down.
 
-Convention: `turns` is the number of clockwise quarter turns after which an image is upright, 0..3. Edges of boxes are
-(x1, y1, x2, y2) in pixels, x2 and y2 exclusive.
+Convention: `turns` is the number of clockwise quarter turns after which an image is upright, 0..3; negative ones turn it
+back. Edges of boxes are (x1, y1, x2, y2) in pixels, x2 and y2 exclusive.
 """
 import functools
 
@@ -76,7 +76,7 @@ def mounted_camera(height_m, tilt_rad, turns, roll_rad=0.0):
 @functools.lru_cache(maxsize=16)
 def turned_camera(camera, turns):
     """The `camera_model.Camera` of the turned image, including its lens distortion."""
-    for _turn in range(turns):
+    for _turn in range(turns % 4):
         distortion = camera.distortion
         if distortion and camera.distortion_model != EQUIDISTANT:
             k1, k2, p1, p2 = distortion[:4]
@@ -87,16 +87,9 @@ def turned_camera(camera, turns):
 
 
 def turned_boxes(boxes, turns, width, height):
-    """Boxes (n, 4) of an image of `width` x `height` pixels, in the turned image. Inverse of `unturned_boxes`."""
-    for _turn in range(turns):
+    """Boxes (n, 4) of an image of `width` x `height` pixels, in the turned image."""
+    for _turn in range(turns % 4):
         x1, y1, x2, y2 = boxes.T
         boxes = np.stack((height - y2, x1, height - y1, x2), axis=1)
         width, height = height, width
     return boxes
-
-
-def unturned_boxes(boxes, turns, width, height):
-    """Boxes (n, 4) of a turned image, in the image of `width` x `height` pixels before it was turned."""
-    if turns % 2:
-        width, height = height, width
-    return turned_boxes(boxes, -turns % 4, width, height)

@@ -11,7 +11,7 @@ from tf2_msgs.msg import TFMessage
 from ros_3d_bb.bags.bag_reader import BagReader, message_in
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.camera.alignment import EdgeComparison, frames_fault, size_fault
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, IMAGE_KINDS, STATIC_TOPIC, TF_TOPIC, uncompressed
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, IMAGE_KINDS, RAW, STATIC_TOPIC, TF_TOPIC, uncompressed
 from ros_3d_bb.conversions.image_msgs import DEPTH_SCALES, imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, camera_from_msg, time_from
 from ros_3d_bb.core.time_sync import NS, SAME_NS
@@ -19,7 +19,6 @@ from ros_3d_bb.diagnosis.camera_mount import camera_mount
 from ros_3d_bb.diagnosis.checks import COLOR, DEPTH, INFO, ROLES
 from ros_3d_bb.diagnosis.observations import COMPRESSED_IMAGE, IMAGE, KEPT, Newest, Observations, Stream, TfSeen
 from ros_3d_bb.diagnosis.tf_tree import links_in
-from ros_3d_bb.pipeline.depth_registration import RAW
 
 COMPARED_NS, PAIRS = NS // 4, 16  # between two images that are kept and compared; number of those that are kept
 BAG_SECONDS = 10.0  # cache length of tf2

@@ -1,11 +1,10 @@
 """The next command on the way from a bag to its tracks, and to a picture of them."""
 from shlex import quote
 
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, DEPTH_TOPICS, info_topic_beside
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, DEPTH_TOPICS, RAW, info_topic_beside
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.diagnosis.checks import COLOR, DEPTH, IMAGES, TRACKS
 from ros_3d_bb.diagnosis.topic_faults import other_topic
-from ros_3d_bb.pipeline.depth_registration import RAW
 
 MIN_ROLL_RAD = 0.02  # smaller ones are within the error of the fitted floor
 

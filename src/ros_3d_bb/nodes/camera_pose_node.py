@@ -6,7 +6,7 @@ import rospy
 import tf2_ros
 from sensor_msgs.msg import Image
 
-from ros_3d_bb.conversions.camera_msgs import (DEPTH_TOPICS, INFO_TOPICS, info_topic_beside, transform_messages,
+from ros_3d_bb.conversions.camera_msgs import (DEPTH_TOPICS, INFO_TOPICS, RAW, info_topic_beside, transform_messages,
                                                uncompressed)
 from ros_3d_bb.core.params import DEPTH, DEPTH_SCALE, IMAGE_ROTATION, Param, parameters
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
@@ -14,7 +14,6 @@ from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import subscribe, subscribe_camera_info
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.pipeline.camera_pose import POSE_FITTED, POSE_TEXT, CameraPoseStage
-from ros_3d_bb.pipeline.depth_registration import RAW
 
 
 @parameters()

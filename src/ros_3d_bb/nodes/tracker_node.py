@@ -6,7 +6,7 @@ from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import Image
 from visualization_msgs.msg import MarkerArray
 
-from ros_3d_bb.conversions.camera_msgs import (COLOR_INFO_IMAGES, DEPTH_TOPICS, INFO_TOPICS, info_topic_beside,
+from ros_3d_bb.conversions.camera_msgs import (COLOR_INFO_IMAGES, DEPTH_TOPICS, INFO_TOPICS, RAW, info_topic_beside,
                                                topic_of)
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, TRACKS_TOPIC, tracks_to_msg
 from ros_3d_bb.core.latest_worker import NewestWorker
@@ -19,7 +19,6 @@ from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscribe_camera_info
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
-from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams, TrackingStage
 from ros_3d_bb.visualization.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter
 

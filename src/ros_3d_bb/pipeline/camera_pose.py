@@ -1,10 +1,10 @@
 """Pose of a camera that tf does not contain, from the floor in its depth images."""
 from ros_3d_bb.camera.image_rotation import mounted_camera, turned_camera, turned_depth, turns_for
+from ros_3d_bb.conversions.camera_msgs import RAW
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
 from ros_3d_bb.conversions.perception_msgs import camera_from_msg, stamp_of
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.depth.ground_plane import camera_pose_above, fit_floor
-from ros_3d_bb.pipeline.depth_registration import RAW
 
 FLOOR = 'floor'  # value of the option and the launch argument camera_pose
 POSE_FITTED = 'poses fitted to the floor'  # event

@@ -2,10 +2,8 @@
 import numpy as np
 import tf2_ros
 
-from ros_3d_bb.camera.registration import RegisteredDepth, Registration
+from ros_3d_bb.camera.registration import Registration
 from ros_3d_bb.conversions.perception_msgs import NEWEST, camera_from_msg
-
-RAW = 'raw'  # value of ~depth
 
 
 class DepthRegistration(object):
@@ -26,10 +24,6 @@ class DepthRegistration(object):
     def add_camera_info(self, message):
         """Add a sensor_msgs/CameraInfo of the depth camera; it is used for all images until the next."""
         self._depth_camera = camera_from_msg(message)
-
-    def register(self, depth, depth_frame, color_camera, color_frame):
-        """Return the RegisteredDepth of a raw DepthImage. Raises ValueError as `geometry`."""
-        return RegisteredDepth(depth, self.geometry(depth, depth_frame, color_camera, color_frame))
 
     def geometry(self, depth, depth_frame, color_camera, color_frame):
         """Return the Registration for a DepthImage, given the optical frames of both cameras.

@@ -4,7 +4,7 @@ from typing import NamedTuple
 import tf2_ros
 
 from ros_3d_bb.camera.camera_model import transform_from
-from ros_3d_bb.camera.image_rotation import AUTO, turned_image, turns_for, unturned_boxes
+from ros_3d_bb.camera.image_rotation import AUTO, turned_boxes, turned_image, turns_for
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import NEWEST, stamp_of
 from ros_3d_bb.core.params import (DEPTH, DEPTH_SCALE, ENABLED, IMAGE_ROTATION, PUBLISH_EMPTY, STAMP_TOLERANCE, Param,
@@ -50,9 +50,9 @@ def detect_in_color(detector, message, turns=0):
     """
     stamp_of(message)
     image = imgmsg_to_rgb(message)
-    height, width = image.shape[:2]
-    detections = detector.detect(turned_image(image, turns))
-    return image, detections._replace(boxes=unturned_boxes(detections.boxes, turns, width, height))
+    upright = turned_image(image, turns)
+    detections = detector.detect(upright)
+    return image, detections._replace(boxes=turned_boxes(detections.boxes, -turns, *upright.shape[1::-1]))
 
 
 class CameraRotation(object):

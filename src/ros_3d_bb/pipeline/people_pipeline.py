@@ -8,7 +8,7 @@ from std_msgs.msg import Int32MultiArray
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.conversions.camera_msgs import (COLOR_INFO_IMAGES, COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, IMAGE_KINDS,
-                                               INFO_TOPICS, STATIC_TOPIC, TF_TOPIC, absolute, info_of_images,
+                                               INFO_TOPICS, RAW, STATIC_TOPIC, TF_TOPIC, absolute, info_of_images,
                                                topic_of, uncompressed)
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, Boxes2D, boxes2d_from_msg,
                                                    boxes3d_to_msg, detections2d_to_msg, header_of, tracks_to_msg)
@@ -16,7 +16,6 @@ from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams
-from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.detection_stage import DepthDetectionStage, DepthDetectorParams, Yolov5NodeParams
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
 from ros_3d_bb.pipeline.rgbd_source import RgbdSource

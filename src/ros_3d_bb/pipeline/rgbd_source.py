@@ -2,13 +2,14 @@
 import tf2_ros
 
 from ros_3d_bb.camera.alignment import ALIGN, size_fault
+from ros_3d_bb.camera.registration import RegisteredDepth
 from ros_3d_bb.camera.rgbd_frame import RgbdFrame, upright_frame
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, INFO_TOPICS
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, INFO_TOPICS, RAW
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (NEWEST, Boxes2D, boxes2d_from_msg, camera_from_msg, stamp_if_any,
                                                    stamp_of)
 from ros_3d_bb.core.time_sync import NS, StampSynchronizer
-from ros_3d_bb.pipeline.depth_registration import RAW, DepthRegistration
+from ros_3d_bb.pipeline.depth_registration import DepthRegistration
 
 UNSTAMPED = '2D boxes without a stamp'  # event, reported once
 TILT_UNKNOWN = 'tilt of the camera unknown'  # event, reported once
@@ -120,7 +121,8 @@ class RgbdSource(object):
         """Return a depth image with the pixels of colour, and the frame of the colour camera."""
         if self._registration is not None:
             frame_id = self._params.frame_id or self._color_frame
-            return self._registration.register(depth, depth_frame, camera, frame_id), frame_id
+            registration = self._registration.geometry(depth, depth_frame, camera, frame_id)
+            return RegisteredDepth(depth, registration), frame_id
         height, width = depth.shape
         if (width, height) != (camera.width, camera.height):
             raise ValueError('%s; depth must be aligned to colour: %s' % (size_fault(camera, width, height), ALIGN))

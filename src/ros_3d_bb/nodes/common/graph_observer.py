@@ -8,13 +8,12 @@ from genpy.message import get_message_class
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo
 
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, info_topic_beside, topic_of
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, RAW, info_topic_beside, topic_of
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC
 from ros_3d_bb.diagnosis.checks import BOXES3D, COLOR, DEPTH, ROLES
 from ros_3d_bb.diagnosis.message_observer import EdgeObserver, Observation, observations_of
 from ros_3d_bb.nodes.common.master import published_topics, publishers_of
 from ros_3d_bb.nodes.common.subscribers import IMAGE_BUFFER
-from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from ros_3d_bb.pipeline.tracking_stage import TrackerNodeParams
 
