@@ -21,7 +21,7 @@ from ros_3d_bb.detection.yolov5.backends import open_detector
 from ros_3d_bb.pipeline.camera_pose import FLOOR, POSE_FITTED, POSE_TEXT, CameraPoseStage
 from ros_3d_bb.pipeline.detection_stage import CameraRotation, detect_in_color
 from ros_3d_bb.pipeline.people_pipeline import (DEPTH_INFO_TOPIC, INFO_TOPIC, INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA,
-                                                CollectedResults, PeoplePipeline, Settings)
+                                                PeoplePipeline, Settings)
 
 MAX_WAITING_BYTES = 2 ** 28  # messages that are read ahead
 DRIVER_TF_NS = NS  # within this time from its start, a bag contains each frame of a camera driver
@@ -53,8 +53,7 @@ class BagRun(object):
         # As in the nodes, the detector has a buffer of its own, because it is ahead of the other stages.
         self._transforms, self._detector_transforms = BagTransforms(), BagTransforms()
         self._unread_tf = collections.deque()  # (time_ns, message) of tf that is not in the buffer yet
-        self._results = CollectedResults(settings.tracker[1], events)
-        self._pipeline = PeoplePipeline(settings, events, self._transforms, self._results)
+        self._pipeline = PeoplePipeline(settings, events, self._transforms)
         self._detector = None
         if settings.detector == 'yolov5':
             params, detection, running = settings.yolov5
@@ -76,7 +75,7 @@ class BagRun(object):
             for waiting in self._ahead(pool):
                 self._add_transforms(waiting.raw.time.to_nsec() + self._ahead_ns)
                 self._process(waiting)
-                yield waiting.raw, self._results.take()
+                yield waiting.raw, self._pipeline.take_results()
         self._pipeline.end()
 
     def _add_static(self, raw):

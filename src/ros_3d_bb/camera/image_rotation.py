@@ -1,7 +1,7 @@
 """Rotation of images by quarter turns, for cameras that are mounted in portrait orientation or upside down.
 
-Convention: `turns` is the number of clockwise quarter turns after which an image is upright, 0..3; negative ones turn it
-back. Edges of boxes are (x1, y1, x2, y2) in pixels, x2 and y2 exclusive.
+Convention: `turns` is the number of clockwise quarter turns after which an image is upright, 0..3; negative ones turn
+it back. Edges of boxes are (x1, y1, x2, y2) in pixels, x2 and y2 exclusive.
 """
 import functools
 

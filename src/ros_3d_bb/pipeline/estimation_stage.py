@@ -100,12 +100,12 @@ class EstimationStage(object):
                                    usable.labels)
         found = [box._replace(score=score) for box, score in zip(estimates, usable.scores.tolist())
                  if box is not None]
-        boxes3d = [box for box in found if box.is_plausible]
-        implausible = [box for box in found if not box.is_plausible] if len(boxes3d) < len(found) else []
-        for box in _as_received(implausible, frame):
-            self._events.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and '
-                              '%.3g m high at %.3g m; less than %g m expected; the others in this image are used'
-                              % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2], box.largest_m)))
+        boxes3d = []
+        for box in found:
+            if box.is_plausible:
+                boxes3d.append(box)
+            else:
+                self._warn_of_size(_as_received(box, frame))
         self._check_scale(found, frame.depth_unit_m)
         counts = {'boxes estimated': len(boxes3d), 'boxes without depth': len(estimates) - len(found)}
         boxes3d = corrected_boxes(boxes3d, self._error_model, abs(frame.stamp_ns - frame.depth_stamp_ns) / NS)
@@ -114,7 +114,12 @@ class EstimationStage(object):
             counts['boxes outside of the measured range'] = len(outside)
         counts['images estimated'] = 1
         self._events.count_all(counts)
-        return _as_received(boxes3d, frame)
+        return [_as_received(box, frame) for box in boxes3d] if frame.turns else boxes3d
+
+    def _warn_of_size(self, box):
+        self._events.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and %.3g m '
+                          'high at %.3g m; less than %g m expected; the others in this image are used'
+                          % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2], box.largest_m)))
 
     def _check_scale(self, boxes3d, unit_m):
         """Warn if people have impossible heights, with the scale that makes them possible."""
@@ -143,19 +148,15 @@ def _level_rotation(up):
     return LEVEL if up is None else level_rotation(up)
 
 
-def _as_received(boxes3d, frame):
-    """Convert Box3Ds of the upright image to the optical frame and the pixels of the image as received."""
-    if not frame.turns:
-        return boxes3d
-    received_from_upright, converted = turned_rotation(frame.turns).T, []
-    for box in boxes3d:
-        (rect_px,) = frame.received_rects(np.array([box.rect_px])).tolist()
-        width_m, height_m, _width_m = box.size_m
-        size_m = box.size_m if frame.turns == 2 else np.array([height_m, width_m, width_m])
-        covariance_m2 = box.covariance_m2
-        if covariance_m2 is not None:
-            covariance_m2 = received_from_upright.dot(covariance_m2).dot(received_from_upright.T)
-        edges = box.truncated_edges[frame.turns:] + box.truncated_edges[:frame.turns]
-        converted.append(box._replace(center_m=received_from_upright.dot(box.center_m), size_m=size_m,
-                                      rect_px=tuple(rect_px), truncated_edges=edges, covariance_m2=covariance_m2))
-    return converted
+def _as_received(box, frame):
+    """Convert a Box3D of the upright image to the optical frame and the pixels of the image as received."""
+    received_from_upright = turned_rotation(frame.turns).T
+    (rect_px,) = frame.received_rects(np.array([box.rect_px])).tolist()
+    width_m, height_m, _width_m = box.size_m
+    size_m = np.array([height_m, width_m, width_m]) if frame.turns % 2 else box.size_m
+    covariance_m2 = box.covariance_m2
+    if covariance_m2 is not None:
+        covariance_m2 = received_from_upright.dot(covariance_m2).dot(received_from_upright.T)
+    return box._replace(center_m=received_from_upright.dot(box.center_m), size_m=size_m, rect_px=tuple(rect_px),
+                        truncated_edges=box.truncated_edges[frame.turns:] + box.truncated_edges[:frame.turns],
+                        covariance_m2=covariance_m2)

@@ -90,34 +90,8 @@ class Settings(NamedTuple):
         return RgbdSource(params, events, on_match, transforms, topics, params.cache_length, params.assumed_delay)
 
 
-class CollectedResults(object):
-    """Collects the messages that the nodes would publish."""
-
-    def __init__(self, marker_params, events):
-        self._markers, self._events, self._messages = MarkerWriter(marker_params), events, []
-
-    def take(self):
-        """Return [(topic, message), ...] since the last call."""
-        messages, self._messages = self._messages, []
-        return messages
-
-    def on_boxes2d(self, camera, message):
-        """Add an Int32MultiArray."""
-        self._messages.append((topic_of(camera, BOXES_TOPIC), message))
-
-    def on_boxes3d(self, camera, message):
-        """Add a BoundingBox3DArray."""
-        self._messages.append((topic_of(camera, BOXES3D_TOPIC), message))
-
-    def on_tracks(self, tracks, header):
-        """Add tracks (`types.TrackedObject`) and their markers."""
-        self._events.count_all({TRACKED: 1} if tracks else {})
-        self._messages += [(TRACKS_TOPIC, tracks_to_msg(tracks, header)),
-                           (MARKERS_TOPIC, self._markers.write(tracks, header))]
-
-
 class PeoplePipeline(object):
-    """The three stages: detection and estimation of each camera, and tracking.
+    """The three stages: detection and estimation of each camera, and tracking. Collects what the nodes would publish.
 
     Networks detect without depth and are therefore outside: their detections are passed to `add_detections`.
 
@@ -127,8 +101,6 @@ class PeoplePipeline(object):
     events : event_counter.EventCounter
     transforms
         As for `tracking_stage.TrackingStage`.
-    results
-        Receives the results, by the methods of `CollectedResults` whose names begin with `on_`.
 
     Raises
     ------
@@ -136,10 +108,11 @@ class PeoplePipeline(object):
         If a parameter is invalid.
     """
 
-    def __init__(self, settings, events, transforms, results):
-        self._settings, self._events, self._results = settings, events, results
-        tracker_params, _marker_params, *tracking = settings.tracker
-        self._tracking_stage = TrackingStage(tracker_params, tracking, events, transforms, results.on_tracks)
+    def __init__(self, settings, events, transforms):
+        self._settings, self._events, self._results = settings, events, []
+        tracker_params, marker_params, *tracking = settings.tracker
+        self._markers = MarkerWriter(marker_params)
+        self._tracking_stage = TrackingStage(tracker_params, tracking, events, transforms, self._on_tracks)
         self._sources, self._detection_stages, self._estimation_stages = {}, {}, {}  # by camera
         for camera in settings.cameras:
             on_match = functools.partial(self._on_match, camera)
@@ -182,6 +155,11 @@ class PeoplePipeline(object):
         if message is not None:
             self._sources[camera].add_boxes(message, now_ns)
 
+    def take_results(self):
+        """Return the messages that the nodes would have published since the last call, [(topic, message), ...]."""
+        results, self._results = self._results, []
+        return results
+
     @contextlib.contextmanager
     def detecting(self):
         """Context manager for the detection in one image. Exceptions are reported and do not stop the pipeline."""
@@ -219,12 +197,18 @@ class PeoplePipeline(object):
         if not len(detections.boxes) and not self._settings.publish_empty:
             return None
         message = detections2d_to_msg(detections, names, header, image.shape[1::-1])
-        self._results.on_boxes2d(camera, message)
+        self._results.append((topic_of(camera, BOXES_TOPIC), message))
         return message
 
     def _estimate_and_track(self, camera, frame, boxes2d):
         boxes3d = self._estimation_stages[camera].estimate(frame, boxes2d)
         message = boxes3d_to_msg(boxes3d, header_of(frame), frame.received_camera)
-        self._results.on_boxes3d(camera, message)
+        self._results.append((topic_of(camera, BOXES3D_TOPIC), message))
         with self._events.rejecting('3D boxes'):
             self._tracking_stage.add_boxes(message, self._now_ns, camera)
+
+    def _on_tracks(self, tracks, header):
+        if tracks:
+            self._events.count(TRACKED)
+        self._results += [(TRACKS_TOPIC, tracks_to_msg(tracks, header)),
+                          (MARKERS_TOPIC, self._markers.write(tracks, header))]

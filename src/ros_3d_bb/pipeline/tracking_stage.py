@@ -112,7 +112,7 @@ class TrackingStage(object):
         self._clocks = CameraClocks()
         self._jumps = 0  # number of backward jumps in time
         self._boxes_ns = {}  # newest stamp of tracked boxes, by camera
-        self._frames, self._usable_frames, self._intrinsics = {}, {}, {}  # by camera
+        self._frames, self._intrinsics = {}, {}  # by camera
         self._depths = {camera: MessageCache(int(params.depth_cache_length * NS)) for camera in self.cameras}
         self._registrations = {camera: DepthRegistration(transforms, topic_of(camera, DEPTH_TOPICS[RAW][1]))
                                for camera in self.cameras if params.depth == RAW}
@@ -161,11 +161,8 @@ class TrackingStage(object):
         """
         stamp_ns, camera_name = stamp_of(message), camera or message.header.frame_id
         frame_id, target_frame = self._params.camera_frame or message.header.frame_id, self._params.target_frame
-        if self._usable_frames.get(camera) != frame_id:
-            fault = target_frame_fault(target_frame, frame_id)
-            if fault:
-                raise ValueError('%s (~target_frame); %s' % (fault, POSE))
-            self._usable_frames[camera] = frame_id
+        if frame_id.lstrip('/') == target_frame:
+            raise ValueError('%s (~target_frame); %s' % (target_frame_fault(target_frame, frame_id), POSE))
         with self.lock:
             if not self._accept(stamp_ns, now_ns, camera):
                 return
