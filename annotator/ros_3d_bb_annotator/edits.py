@@ -54,7 +54,7 @@ class Edits(object):
         indices = self._window.selection
         reason = dialogs.ask_reason(self._window, [self._window.document.measurements[index].id for index in indices])
         if reason:
-            self._enter(lambda document: document.reject_all(indices, reason), '%d rejected' % len(indices))
+            self._enter(lambda document: document.reject(indices, reason), '%d rejected' % len(indices))
 
     def restore(self):
         self._edit(Document.restore)
@@ -123,7 +123,7 @@ class Edits(object):
         window, index = self._window, self._window.current
         if self._edit(lambda document, _index: edit(document)):
             window.last_entry.setText('<b>%s</b>: %s' % (
-                window.measurement.id, text or error_text(window.document.errors(index))))
+                window.measurement.id, text or error_text(window.document.known_errors(index))))
             window.next_new()
 
     def _edit(self, edit, *values):
