@@ -77,7 +77,8 @@ def measurement_of(folder, entry):
     except SessionError as error:
         return EditedMeasurement(str(known.get('id', '')), '', '', problem=str(error),
                                  rejected=str(known['rejected']) if known.get('rejected') else None)
-    missing = [os.path.relpath(path, folder) for path in (frame.color_path, frame.depth_path) if not os.path.exists(path)]
+    missing = [os.path.relpath(path, folder) for path in (frame.color_path, frame.depth_path)
+               if not os.path.exists(path)]
     return EditedMeasurement(
         frame.id, frame.color_path, frame.depth_path, str(entry.get('stamp') or ''), frame.label, frame.detections,
         frame.person if frame.detections else None, truth_of(frame), frame.rejected,

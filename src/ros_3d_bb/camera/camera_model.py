@@ -19,13 +19,8 @@ class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float
     """Intrinsics of a camera; image size, focal lengths and principal point in pixels.
 
     `distortion_model` and `distortion` are as in sensor_msgs/CameraInfo, see `distortion.MODELS`. They are normalised:
-    a camera without lens distortion has '' and ().
-
-    Raises
-    ------
-    ValueError
-        If the size is not positive, a focal length is not positive and finite, the principal point is not finite, or
-        `checked_distortion` rejects the distortion.
+    a camera without lens distortion has '' and (). Raises ValueError if the size is not positive, a focal length is not
+    positive and finite, the principal point is not finite, or `checked_distortion` rejects the distortion.
     """
 
     __slots__ = ()

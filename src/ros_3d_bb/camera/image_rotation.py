@@ -16,19 +16,8 @@ TURNED_FROM_CAMERA = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0
 
 
 def turns_for(image_rotation, up):
-    """Quarter turns that make the images of a camera upright.
-
-    Parameters
-    ----------
-    image_rotation : str
-        Clockwise rotation in degrees; `AUTO`: from `up`.
-    up : array_like, (3,) or None
-        Unit vector in the optical frame; None if unknown.
-
-    Returns
-    -------
-    int
-        0 for `AUTO` if `up` is unknown.
+    """Quarter turns that make the images of a camera upright: `image_rotation`, clockwise degrees as text, or for
+    `AUTO` those of the unit vector `up` (3,) in the optical frame, 0 if it is unknown (None).
     """
     if image_rotation != AUTO:
         return int(image_rotation) // 90
@@ -56,15 +45,8 @@ def turned_rotation(turns):
 def mounted_camera(height_m, tilt_rad, turns, roll_rad=0.0):
     """Pose (4, 4) of the optical frame of a camera that looks along x, above the origin of a frame whose z points up.
 
-    Parameters
-    ----------
-    height_m : float
-    tilt_rad : float
-        Pitch; positive: the camera looks down (REP 103).
-    turns : int
-        The camera is rolled so that this number of quarter turns makes its images upright.
-    roll_rad : float
-        Roll in addition to `turns`; positive: its right side is lower (REP 103).
+    Angles are as in REP 103: with a positive `tilt_rad`, its pitch, the camera looks down, and with a positive
+    `roll_rad` its right side is lower. It is also rolled so that `turns` quarter turns make its images upright.
     """
     pitched = transform_from((0, 0, height_m), (0, np.sin(tilt_rad / 2), 0, np.cos(tilt_rad / 2)))
     rolled = transform_from((0, 0, 0), (np.sin(roll_rad / 2), 0, 0, np.cos(roll_rad / 2)))

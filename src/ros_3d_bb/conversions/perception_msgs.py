@@ -111,13 +111,9 @@ def detections2d_to_msg(detections, names, header, image_size):
 def boxes2d_from_msg(message):
     """Convert an Int32MultiArray, with or without stamp, classes and scores in its layout, to Boxes2D.
 
-    Without classes, the boxes are those of people; without scores, their scores are unknown.
-
-    Raises
-    ------
-    ValueError
-        If the length is not a multiple of 4, there are too many boxes, or the label is malformed: the stamp is not a
-        number, there is not one class or one score for each box, or one of them is invalid.
+    Without classes, the boxes are those of people; without scores, their scores are unknown. Raises ValueError if the
+    length is not a multiple of 4, there are too many boxes, or the label is malformed: the stamp is not a number, there
+    is not one class or one score for each box, or one of them is invalid.
     """
     if len(message.data) % 4:
         raise ValueError('2D boxes have %d numbers; a multiple of 4 expected (x1 y1 x2 y2 each)' % len(message.data))

@@ -13,18 +13,9 @@ def locked_update(folder):
     """Lock the description of a session in an existing folder, and write it when the block ends without an error.
 
     Other programs wait for the lock, so that the viewer can add measurements to a session that is being annotated.
-
-    Yields
-    ------
-    dict
-        Content of frames.json, to be modified in place; {'frames': []} if the file does not exist.
-
-    Raises
-    ------
-    OSError
-        If the folder cannot be read or written.
-    ValueError
-        If frames.json is not the description of a session, or the new content has nan or inf.
+    Yields the content of frames.json, a dict to be modified in place; {'frames': []} if the file does not exist. Raises
+    OSError if the folder cannot be read or written, and ValueError if frames.json is not the description of a session,
+    or the new content has nan or inf.
     """
     path = os.path.join(str(folder), FILE_NAME)
     with open(os.path.join(str(folder), '.lock'), 'a') as lock:

@@ -25,13 +25,8 @@ class CameraMount(NamedTuple):
 
 
 def camera_mount(pairs, camera):
-    """Return the CameraMount of a camera.
-
-    Parameters
-    ----------
-    pairs : sequence of (ndarray, DepthImage)
-        RGB images (h, w, 3) and aligned depth of the same time.
-    camera : camera_model.Camera
+    """Return the CameraMount of a Camera, from pairs of an RGB image (h, w, 3) and the aligned DepthImage of the same
+    time.
     """
     chosen = [pairs[number] for number in np.unique(np.linspace(0, len(pairs) - 1, IMAGES).astype(int))]
     people = {0: _people_in(chosen, camera, 0)}

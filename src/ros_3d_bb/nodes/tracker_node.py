@@ -134,12 +134,8 @@ class TrackIdReservation(object):
 
     The largest reserved ID is stored on the parameter server, which outlives the node. The parameter is outside the
     node's namespace (`/tracker_node_numbers`), because roslaunch clears private parameters. IDs are also assigned while
-    the master is unreachable. `last_id` is the last ID that was reserved before the node was started.
-
-    Raises
-    ------
-    ValueError
-        If the parameter is not a valid ID.
+    the master is unreachable. `last_id` is the last ID that was reserved before the node was started. Raises ValueError
+    if the parameter is not a valid ID.
     """
 
     def __init__(self, diagnostics, part=Part()):

@@ -16,12 +16,8 @@ IMAGES, PERIOD_NS = 8, NS // 4
 class CameraPoseStage(object):
     """Fits the pose of a camera to the floor in its depth images, of which at most one each `PERIOD_NS` is used.
 
-    With raw depth, it is the pose of the depth camera, which tf connects with the colour camera.
-
-    Parameters
-    ----------
-    params : NamedTuple
-        With ~depth, ~depth_scale, ~frame_id and ~image_rotation.
+    With raw depth, it is the pose of the depth camera, which tf connects with the colour camera. `params` has ~depth,
+    ~depth_scale, ~frame_id and ~image_rotation.
     """
 
     def __init__(self, params):

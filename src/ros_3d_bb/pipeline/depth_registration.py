@@ -9,12 +9,9 @@ from ros_3d_bb.conversions.perception_msgs import NEWEST, camera_from_msg
 class DepthRegistration(object):
     """Register raw depth images to the colour camera.
 
-    Parameters
-    ----------
-    transforms
-        As for `tracking_stage.TrackingStage`. The latest transform is used: the cameras are fixed to each other.
-    info_topic : str
-        Topic of the camera_info of the depth camera, for the error message if it is missing.
+    `transforms` is as for `tracking_stage.TrackingStage`; the latest transform is used, as the cameras are fixed to
+    each other. `info_topic`, that of the camera_info of the depth camera, is named in the error message if it is
+    missing.
     """
 
     def __init__(self, transforms, info_topic):
@@ -28,10 +25,7 @@ class DepthRegistration(object):
     def geometry(self, depth, depth_frame, color_camera, color_frame):
         """Return the Registration for a DepthImage, given the optical frames of both cameras.
 
-        Raises
-        ------
-        ValueError
-            If there is no camera_info of depth, it has another size, or the transform is missing.
+        Raises ValueError if there is no camera_info of depth, it has another size, or the transform is missing.
         """
         camera = self._depth_camera
         if camera is None:

@@ -58,15 +58,9 @@ def detect_in_color(detector, message, turns=0):
 class CameraRotation(object):
     """Quarter turns that make the images of one camera upright, from ~image_rotation or tf.
 
-    The transform is looked up until it is available, and not again: the camera is fixed to the robot.
-
-    Parameters
-    ----------
-    params : Yolov5NodeParams
-    transforms
-        As for `tracking_stage.TrackingStage`. It is not used if ~image_rotation is given, or no floor frame.
-    on_known : callable
-        Called once no further lookups are necessary.
+    The transform is looked up in `transforms`, as for `tracking_stage.TrackingStage`, until it is available, and not
+    again: the camera is fixed to the robot. It is not used if ~image_rotation is given, or no ~floor_frame. `on_known`
+    is called once no further lookups are necessary.
     """
 
     def __init__(self, params, transforms, on_known=lambda: None):
@@ -90,14 +84,7 @@ class CameraRotation(object):
 
 
 class DepthDetectionStage(object):
-    """Detect people in frames with `detection.depth`.
-
-    Parameters
-    ----------
-    params : DepthDetectorParams
-    people : DepthPeopleParams
-    events : event_counter.EventCounter
-    """
+    """Detect people in frames with `detection.depth`; `params` are DepthDetectorParams, `people` DepthPeopleParams."""
 
     names = ('person',)
 

@@ -46,15 +46,7 @@ class Bbox3dParams(NamedTuple):
 class EstimationStage(object):
     """Estimate the 3D boxes of frames, and correct them by an error model. `events` counts rejected boxes.
 
-    Parameters
-    ----------
-    params : Bbox3dParams
-    events : event_counter.EventCounter
-
-    Raises
-    ------
-    ValueError
-        If a parameter is invalid.
+    Raises ValueError if one of the `params`, Bbox3dParams, is invalid.
     """
 
     def __init__(self, params, events):
@@ -79,20 +71,10 @@ class EstimationStage(object):
         return self._estimator.sample
 
     def estimate(self, frame, boxes2d):
-        """Estimate the 3D boxes of one image.
+        """Estimate the 3D boxes of one image from its RgbdFrame and Boxes2D.
 
         A 2D box yields no 3D box if it is empty or reversed, has no depth of its own, or gives an implausible size.
-
-        Parameters
-        ----------
-        frame : rgbd_frame.RgbdFrame
-        boxes2d : perception_msgs.Boxes2D
-            In the image as received.
-
-        Returns
-        -------
-        list of box3d.Box3D
-            In the optical frame of the image as received.
+        Returns a list of `box3d.Box3D`; like the 2D boxes, they belong to the image as received, and its optical frame.
         """
         usable = self._usable_boxes(boxes2d)
         rects_px = list(map(tuple, frame.upright_rects(usable.boxes).tolist()))

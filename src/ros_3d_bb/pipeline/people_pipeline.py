@@ -94,18 +94,7 @@ class PeoplePipeline(object):
     """The three stages: detection and estimation of each camera, and tracking. Collects what the nodes would publish.
 
     Networks detect without depth and are therefore outside: their detections are passed to `add_detections`.
-
-    Parameters
-    ----------
-    settings : Settings
-    events : event_counter.EventCounter
-    transforms
-        As for `tracking_stage.TrackingStage`.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is invalid.
+    `transforms` is as for `tracking_stage.TrackingStage`. Raises ValueError if one of the Settings is invalid.
     """
 
     def __init__(self, settings, events, transforms):

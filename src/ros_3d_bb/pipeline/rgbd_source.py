@@ -30,9 +30,9 @@ class RgbdSource(object):
         Called with the arguments of `frame` when the messages of one stamp are complete.
     transforms
         As for `tracking_stage.TrackingStage`, for the floor and raw depth; None if neither is used.
-    topics : sequence of str, optional
+    topics : sequence of str
         Topics of the depth images, their camera_info and that of colour, for error messages about missing ones.
-    cache_s, assumed_delay_s : float, optional
+    cache_s, assumed_delay_s : float
         See `StampSynchronizer`; the delay is also an attribute.
     """
 
@@ -87,20 +87,11 @@ class RgbdSource(object):
         self._sync.end()
 
     def frame(self, trigger, depth_msg, camera):
-        """Return the RgbdFrame of matched messages.
+        """Return the RgbdFrame of matched messages: the colour image, or the Boxes2D in it (the frame then has no
+        colour); the depth image; and the Camera.
 
-        Parameters
-        ----------
-        trigger : sensor_msgs/Image or perception_msgs.Boxes2D
-            The colour image, or the 2D boxes in it; then the frame has no colour.
-        depth_msg : sensor_msgs/Image
-        camera : camera_model.Camera
-
-        Raises
-        ------
-        ValueError
-            If an image cannot be read, the colour image has another size than its camera_info, or the depth image has
-            another size than the camera or cannot be registered.
+        Raises ValueError if an image cannot be read, the colour image has another size than its camera_info, or the
+        depth image has another size than the camera or cannot be registered.
         """
         received = imgmsg_to_depth(depth_msg, self._params.depth_scale, check_unit=True)
         depth, frame_id = self._aligned(received, depth_msg.header.frame_id, camera)

@@ -65,7 +65,8 @@ class TrackingStage(object):
 
     If there is no transform at the stamp of the boxes, there is no result and tracks do not age. Each message is passed
     with the namespace of its camera, '' for a single one; boxes and depth images also with their arrival time `now_ns`
-    (integer nanoseconds) on a clock chosen by the caller. The methods are thread-safe.
+    (integer nanoseconds) on a clock chosen by the caller. The methods are thread-safe. The constructor and
+    `reconfigure` raise ValueError if a parameter is invalid.
 
     Parameters
     ----------
@@ -89,11 +90,6 @@ class TrackingStage(object):
     uses_camera_info, uses_depth : bool
         Which other messages are used. The thesis tracker considers neither the field of view nor occlusion.
     lock : threading.RLock
-
-    Raises
-    ------
-    ValueError
-        If a parameter is invalid.
     """
 
     def __init__(self, params, tracking, events, transforms, on_tracks, last_id=0):
