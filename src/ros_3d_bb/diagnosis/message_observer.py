@@ -86,10 +86,10 @@ class Observation(object):
         return Stream(self.role, self.topic, published_kind, publishers, self._count,
                       (self._count - 1) / passed_s if passed_s > 0 else 0.0, tuple(self._stamps_ns), *self._lags_s)
 
-    def tf_seen(self, lookup, frames_as_yaml, target_frame, source_frame=''):
+    def tf_seen(self, transforms, target_frame, source_frame=''):
         """Look up the pose of the camera in the fixed frame at the stamp of an image. None without images.
 
-        `lookup` and `frames_as_yaml` are methods of a tf2 buffer; `source_frame` replaces the frame_id of the image.
+        `transforms` is a TransformBuffer; `source_frame` replaces the frame_id of the image.
         """
         if not self._stamps_ns:
             return None
@@ -97,10 +97,10 @@ class Observation(object):
         target, source = target_frame.lstrip('/'), (source_frame or self.newest.header.frame_id).lstrip('/')
         stamp, fault = time_from(stamp_ns), ''
         try:
-            lookup(target, source, stamp)
+            transforms.lookup(target, source, stamp)
         except tf2_ros.TransformException as error:
             fault = str(error)
-        return TfSeen(target, source, stamp.to_sec(), links_in(frames_as_yaml()), fault)
+        return TfSeen(target, source, stamp.to_sec(), links_in(transforms.all_frames_as_yaml()), fault)
 
 
 def observations_of(observed, depth_info, topics, seconds, publishers_of=lambda _observation: (), **others):
@@ -136,9 +136,8 @@ def observe_bag(path, name_of, target_frame, depth='aligned'):
     info = observed[INFO].newest
     frame_id = info.header.frame_id if depth == RAW and info is not None else ''  # that of the 3D boxes
     seen = observations_of(observed, depth_info, topics, BAG_SECONDS, is_bag=True, edges_fault=edges.fault(),
-                           tf=observed[DEPTH].tf_seen(transforms.lookup, transforms.frames_as_yaml, target_frame,
-                                                      frame_id), depth_is_raw=depth == RAW, raw_topics=raw_topics,
-                           depth_info_topic=depth_info.topic)
+                           tf=observed[DEPTH].tf_seen(transforms, target_frame, frame_id), depth_is_raw=depth == RAW,
+                           raw_topics=raw_topics, depth_info_topic=depth_info.topic)
     if depth == RAW:
         return seen
     is_aligned = seen.color_info is not None and seen.depth is not None and not (

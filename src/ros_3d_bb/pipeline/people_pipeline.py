@@ -70,11 +70,6 @@ class Settings(NamedTuple):
         topic = topic_of(camera, topic)
         return absolute(self.names.get(topic, topic))
 
-    @property
-    def publish_empty(self):
-        """Whether the detector publishes an array without boxes."""
-        return (self.depth if self.detector == 'depth' else self.yolov5)[0].publish_empty
-
     def source(self, camera, events, on_match, transforms):
         """Return the RgbdSource of a camera, for both detection and estimation.
 
@@ -99,6 +94,7 @@ class PeoplePipeline(object):
 
     def __init__(self, settings, events, transforms):
         self._settings, self._events, self._results = settings, events, []
+        self._publish_empty = (settings.depth if settings.detector == 'depth' else settings.yolov5)[0].publish_empty
         tracker_params, marker_params, *tracking = settings.tracker
         self._markers = MarkerWriter(marker_params)
         self._tracking_stage = TrackingStage(tracker_params, tracking, events, transforms, self._on_tracks)
@@ -183,7 +179,7 @@ class PeoplePipeline(object):
 
     def _boxes2d(self, camera, header, image, detections, names):
         """Return the message of Detections, None if it is not published."""
-        if not len(detections.boxes) and not self._settings.publish_empty:
+        if not len(detections.boxes) and not self._publish_empty:
             return None
         message = detections2d_to_msg(detections, names, header, image.shape[1::-1])
         self._results.append((topic_of(camera, BOXES_TOPIC), message))
