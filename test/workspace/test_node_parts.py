@@ -16,6 +16,7 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.nodes.bbox3d_node import SampleImages
 from ros_3d_bb.nodes.common import master, startup, subscribers
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics, unsubscribed_results
+from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from support.ros import wait_until
 
 
@@ -64,7 +65,7 @@ def test_3d_boxes_do_not_wait_for_a_master_to_subscribe_colour():
             mock.patch('ros_3d_bb.nodes.bbox3d_node.patient_master', side_effect=OSError('no route')) as query:
         publisher.return_value.get_num_connections.return_value = 1
         diagnostics, depth = mock.MagicMock(), DepthImage(np.zeros((4, 4), np.uint16), 0.001)
-        images = SampleImages(10 ** 9, None, 6.0, diagnostics)
+        images = SampleImages(Bbox3dParams(), None, diagnostics)
         images.publish(Header(), depth, [])
         wait_until(lambda: diagnostics.warn.called, 'a warning')
         assert 'no route' in diagnostics.warn.call_args[0][1] and not subscriber.called

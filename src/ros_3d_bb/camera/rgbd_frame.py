@@ -46,7 +46,7 @@ class RgbdFrame(NamedTuple):
 
     def upright_rects(self, rects_px):
         """Rectangles (n, 4) of the received image in the upright image. Inverse of `received_rects`."""
-        return turned_boxes(rects_px, self.turns, *self.received_camera[:2])
+        return turned_boxes(rects_px, self.turns, *self.received_camera[:2]) if self.turns else rects_px
 
     def received_rects(self, rects_px):
         """Rectangles (n, 4) of the upright image in the received image."""

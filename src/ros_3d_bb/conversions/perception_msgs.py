@@ -142,25 +142,22 @@ def boxes2d_from_msg(message):
 def _labels_and_scores(classes, scores, count):
     """Class names and scores of `count` boxes from the texts in a label, which are None if they are missing."""
     labels, numbers = (PERSON,) * count, np.zeros(count)
+    for name, text in (('classes', classes), ('scores', scores)):
+        if text and text.count(',') + 1 != count:
+            raise ValueError('2D boxes have %d %s for %d boxes; one for each box expected'
+                             % (text.count(',') + 1, name, count))
     if classes:
-        labels = tuple(_entries(classes, count, 'classes'))
+        labels = tuple(classes.split(','))
         for fault in filter(None, map(label_fault, set(labels))):
             raise ValueError('2D boxes have %s' % fault)
     if scores:
         try:
-            numbers = np.array(list(map(float, _entries(scores, count, 'scores'))))
+            numbers = np.array(list(map(float, scores.split(','))))
         except ValueError as error:
             raise ValueError('2D boxes have unusable scores: %s' % error)
         for fault in filter(None, map(score_fault, numbers)):
             raise ValueError('2D boxes have %s' % fault)
     return labels, numbers
-
-
-def _entries(text, count, name):
-    entries = text.split(',')
-    if len(entries) != count:
-        raise ValueError('2D boxes have %d %s for %d boxes; one for each box expected' % (len(entries), name, count))
-    return entries
 
 
 def with_stamp(message, stamp):

@@ -202,13 +202,12 @@ class StampSynchronizer(object):
         """Call the callbacks for boxes whose frame is complete, is lost, or did not arrive in time."""
         if not self._waiting:
             return
-        settled, waiting = [], []
-        newest_ns = self._depths.newest_ns
-        is_tolerance_known = self._tolerance_ns > 0 or len(self._depths) > 1
+        settled, waiting, newest_ns = [], [], self._depths.newest_ns
         for number, entry in enumerate(self._waiting):
             depth = self._depths.matching(entry.stamp_ns, self._tolerance_ns)
             camera = None if depth is None else self._camera_at(entry.stamp_ns)
-            is_lost = depth is None and newest_ns is not None and entry.stamp_ns < newest_ns and is_tolerance_known
+            is_lost = depth is None and newest_ns is not None and entry.stamp_ns < newest_ns and (
+                self._tolerance_ns > 0 or len(self._depths) > 1)  # else the tolerance is unknown
             is_late = now_ns - entry.arrival_ns > self._length_ns
             is_crowded = len(self._waiting) - number > MAX_WAITING
             if camera is not None or is_lost or is_late or is_crowded:

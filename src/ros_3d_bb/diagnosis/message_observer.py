@@ -103,13 +103,16 @@ class Observation(object):
         return TfSeen(target, source, stamp.to_sec(), links_in(transforms.all_frames_as_yaml()), fault)
 
 
-def observations_of(observed, depth_info, topics, seconds, publishers_of=lambda _observation: (), **others):
+def observations_of(observed, depth_info, topics, seconds, publishers_of=lambda _topic: (), **others):
     """Return the Observations of recorded messages; `topics`, `seconds` and `others` are fields of it.
 
     `observed` has an Observation for each role, `depth_info` is that of the camera_info of depth, and `publishers_of`
-    returns the publishers of an Observation.
+    returns the publishers of a topic; it is called for silent ones.
     """
-    streams = {key: one.stream(topics.get(one.topic, ''), publishers_of(one)) for key, one in observed.items()}
+    streams = {}
+    for key, one in observed.items():
+        publishers = publishers_of(one.topic) if one.newest is None and one.topic in topics else ()
+        streams[key] = one.stream(topics.get(one.topic, ''), publishers)
     return Observations(streams, topics, seconds,
                         color_info=_newest(observed[INFO].newest, camera_from_msg),
                         depth_info=_newest(depth_info.newest, camera_from_msg),

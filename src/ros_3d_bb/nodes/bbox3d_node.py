@@ -49,8 +49,7 @@ class Bbox3dNode(object):
         self._next_stage = part.next_stage
         self._stage = EstimationStage(params, self._diagnostics)
         self._boxes_pub = rospy.Publisher(BOXES3D_TOPIC, BoundingBox3DArray, queue_size=10)
-        self._images = SampleImages(int(params.cache_length * NS), self._stage.sample, params.depth_image_range,
-                                    self._diagnostics)
+        self._images = SampleImages(params, self._stage, self._diagnostics)
         self._inputs = RgbdInputs(params, self._diagnostics, self._on_match, part.transforms,
                                   cache_s=params.cache_length, assumed_delay_s=params.assumed_delay)
         if params.depth != RAW:
@@ -63,7 +62,7 @@ class Bbox3dNode(object):
         with self._inputs.lock:
             self._stage.reconfigure(params)
             self._inputs.source.assumed_delay_s = params.assumed_delay
-            self._images.reconfigure(self._stage.sample, params.depth_image_range)
+            self._images.depth_range_m = params.depth_image_range
 
     def on_boxes(self, message):
         """Process the 2D boxes of an image."""
@@ -130,6 +129,8 @@ class DepthCameraCheck(object):
 class SampleImages(object):
     """Publish the images and depth samples from which 3D boxes were estimated.
 
+    Depth from `depth_range_m` on is drawn as black.
+
     Subscribes
     ----------
     camera/color/image_raw : sensor_msgs/Image
@@ -145,18 +146,14 @@ class SampleImages(object):
         Depth image in grey; published only if there are subscribers.
     """
 
-    def __init__(self, cache_ns, sample, depth_range_m, diagnostics):
-        self._diagnostics = diagnostics
-        self.reconfigure(sample, depth_range_m)
+    def __init__(self, params, stage, diagnostics):
+        self._stage, self._diagnostics, self.depth_range_m = stage, diagnostics, params.depth_image_range
         self._raw_pub, self._color_pub, self._depth_pub = (
             rospy.Publisher('ros_3d_bb/' + name, Image, queue_size=1) for name in ('raw', 'color', 'depth'))
-        self._cache_ns, self._colors, self._subscriber = cache_ns, MessageCache(cache_ns), None
+        self._cache_ns = int(params.cache_length * NS)
+        self._colors, self._subscriber = MessageCache(self._cache_ns), None
         # In a separate thread, because an unresponsive master must not block the 3D boxes.
         self._subscription = NewestWorker(self._subscribe, self._on_error)
-
-    def reconfigure(self, sample, depth_range_m):
-        """Set the sampling function and the depth (metres) drawn as black for the next images."""
-        self._sample, self._depth_range_m = sample, depth_range_m
 
     def publish(self, header, depth, boxes):
         """Publish the debug images of one set of 3D boxes on the topics that have subscribers."""
@@ -164,7 +161,7 @@ class SampleImages(object):
         if (needs_raw or needs_color) != (self._subscriber is not None):
             self._subscription.offer(needs_raw or needs_color)
         if self._depth_pub.get_num_connections():
-            grey = depth_to_grey(depth, self._depth_range_m)
+            grey = depth_to_grey(depth, self.depth_range_m)
             self._depth_pub.publish(fill_image(Image(header=header), grey, 'mono8'))
         color = self._colors.nearest(header.stamp.to_nsec())
         if color is None:
@@ -178,7 +175,7 @@ class SampleImages(object):
                 for box in boxes:
                     draw_boxes(image, [box.rect_px], [described(box.label, '%.2f m' % box.center_m[2])])
                 for box in boxes:
-                    draw_samples(image, box.rect_px, self._sample(depth, box.rect_px))
+                    draw_samples(image, box.rect_px, self._stage.sample(depth, box.rect_px))
                 self._color_pub.publish(fill_image(Image(header=header), image, 'rgb8'))
 
     def _subscribe(self, wanted):

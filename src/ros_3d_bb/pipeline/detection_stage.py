@@ -101,17 +101,14 @@ class DepthDetectionStage(object):
 
         Raises ValueError if the images cannot be used.
         """
-        detections = self._detector.detect(frame.color, frame.depth, frame.camera, self._floor(frame))
+        floor = None  # the detector fits it
+        if frame.camera_from_floor is not None:
+            base_from_floor = transform_from((0, 0, self._params.floor_height), (0, 0, 0, 1))
+            floor = floor_from_transform(frame.camera_from_floor.dot(base_from_floor))
+        detections = self._detector.detect(frame.color, frame.depth, frame.camera, floor)
         if detections is None:
             self._events.warn('images without floor', 'tf gives no floor, and none is visible in the depth image; no '
                               'detection; waiting for the next image')
             return None
         self._events.count('images processed')
         return detections._replace(boxes=frame.received_rects(detections.boxes))
-
-    def _floor(self, frame):
-        """Return the floor plane from tf, or None if it is unknown, so that the detector fits it."""
-        if frame.camera_from_floor is None:
-            return None
-        base_from_floor = transform_from((0, 0, self._params.floor_height), (0, 0, 0, 1))
-        return floor_from_transform(frame.camera_from_floor.dot(base_from_floor))

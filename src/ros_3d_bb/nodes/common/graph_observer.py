@@ -63,7 +63,7 @@ class GraphObserver(object):
         camera_frame = tracker_param('camera_frame') or (
             boxes3d.header.frame_id if boxes3d is not None else self._bbox3d_param('frame_id'))
         return observations_of(
-            self._observed, self._depth_info, self._topics, time.monotonic() - self._began_s, self._publishers_of,
+            self._observed, self._depth_info, self._topics, time.monotonic() - self._began_s, publishers_of,
             tf=self._observed[DEPTH].tf_seen(self._transforms, target_frame, camera_frame),
             use_sim_time=bool(rospy.get_param('/use_sim_time', False)), clock_count=len(self._clocks),
             nodes={name: status[:2] for name, status in list(self._statuses.items())},
@@ -73,9 +73,6 @@ class GraphObserver(object):
 
     def _bbox3d_param(self, name):
         return _param(topic_of(self._camera, 'bbox3d_node'), name, Bbox3dParams())
-
-    def _publishers_of(self, one):
-        return () if one.newest is not None or one.topic not in self._topics else publishers_of(one.topic)
 
     def _topic_of(self, name):
         """Return the name of a topic of the nodes in this graph."""
