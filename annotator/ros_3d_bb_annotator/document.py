@@ -9,11 +9,11 @@ import os
 import numpy as np
 
 from ros_3d_bb.camera.depth_image import FARTHEST_M
-from ros_3d_bb.core.atomic_file import FILE_NAME, locked_update
 from ros_3d_bb.estimation.box3d import plausible
 from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named
-from ros_3d_bb.sessions.session_reader import (Session, SessionError, camera_of, boxes_of_others, read_color,
+from ros_3d_bb.sessions.session_reader import (FILE_NAME, Session, SessionError, boxes_of_others, camera_of, read_color,
                                                read_depth, read_description, session_errors)
+from ros_3d_bb.sessions.session_writer import locked_update
 from ros_3d_bb_annotator.entries import (Edit, changed, detections_of, drawn, entry_at, grid_of, mark_entry,
                                          truth_entry, with_detections, with_person)
 from ros_3d_bb_annotator.estimates import Estimates

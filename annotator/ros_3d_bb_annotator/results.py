@@ -22,11 +22,11 @@ class Work(QtCore.QThread):
 
 
 class Results(QtCore.QObject):
-    """Exports and analyses the document of a window. `analysed` is the last `analysis.Analysed`."""
+    """Exports and analyses the document of a window. `analysis` is the last one, see `analysis.analyse`."""
 
     def __init__(self, window):
         super(Results, self).__init__(window)
-        self._window, self._work, self.analysed = window, None, None
+        self._window, self._work, self.analysis = window, None, None
 
     @property
     def is_busy(self):
@@ -71,13 +71,13 @@ class Results(QtCore.QObject):
         if self._work.error is not None:
             dialogs.show_error(self._window, 'The noise analysis failed', self._work.error)
             return
-        self.analysed = self._work.result
-        text = ('Report and figures are in %s; %s' % (self.analysed.folder, self.analysed.model_note)
-                if self.analysed.model_note else 'Report, figures and error model are in %s' % self.analysed.folder)
-        if self.analysed.outliers:
-            text += '; %d implausible positions were left out (Ctrl+I)' % len(self.analysed.outliers)
+        self.analysis, _text, folder = self._work.result
+        text = ('Report and figures are in %s; %s' % (folder, self.analysis.model_note)
+                if self.analysis.model_note else 'Report, figures and error model are in %s' % folder)
+        if self.analysis.inputs.outliers:
+            text += '; %d implausible positions were left out (Ctrl+I)' % len(self.analysis.inputs.outliers)
         self._window.statusBar().showMessage(text)
-        QtGui.QDesktopServices.openUrl(QtCore.QUrl.fromLocalFile(self.analysed.report_path))
+        QtGui.QDesktopServices.openUrl(QtCore.QUrl.fromLocalFile(str(folder / 'report.html')))
 
 
 def _analysed(document):
