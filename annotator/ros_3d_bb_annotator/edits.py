@@ -15,9 +15,9 @@ class Edits(object):
     def __init__(self, window):
         self._window = window
 
-    def enter_truth(self, x_m, z_m, y_m=None):
-        """Set the truth of the selected measurements, and go to the next measurement."""
-        self._enter_truth(self._window.selection, (x_m, y_m, z_m))
+    def enter_truth(self, truth_m):
+        """Set the truth (x, y, z) of the selected measurements, and go to the next measurement."""
+        self._enter_truth(self._window.selection, truth_m)
 
     def enter_for_label(self):
         """Set the typed or offered truth of all measurements with the current label that are not done."""
@@ -26,13 +26,13 @@ class Edits(object):
             window.pane.truth.show_problem('The measurement has no label')
             return
         try:
-            x_m, z_m, y_m = window.pane.truth.read()
+            truth_m = window.pane.truth.read()
         except ValueError as error:
             window.pane.truth.show_problem(str(error))
             return
         self._enter_truth([index for index, other in enumerate(window.document.measurements)
                            if index == window.current or (other.label == window.measurement.label and not other.is_done
-                                                          and other.detections)], (x_m, y_m, z_m))
+                                                          and other.detections)], truth_m)
 
     def same_as_last(self):
         """Set the truth of the last annotated measurement, and go to the next measurement."""

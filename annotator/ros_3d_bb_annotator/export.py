@@ -34,9 +34,8 @@ def rows_of(document, estimator):
 
 
 def export(document, path, estimator):
-    """Write the table to a CSV file atomically, and return the number of rows.
-
-    Raises SessionError if no measurement is annotated, or the file cannot be written.
+    """Write the table to a CSV file atomically. Returns the number of rows. Raises SessionError without rows, or if the
+    file cannot be written.
     """
     rows = list(rows_of(document, estimator))
     if not rows:

@@ -210,7 +210,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self.pane.shared.box_drawn.connect(self.edits.add_box)
         self.pane.shared.box_edited.connect(self.edits.replace_box)
         self.pane.truth.entered.connect(self.edits.enter_truth)
-        self.pane.floor.mark_chosen.connect(lambda mark: self.edits.enter_truth(mark.x_m, mark.z_m))
+        self.pane.floor.mark_chosen.connect(lambda mark: self.edits.enter_truth((mark.x_m, None, mark.z_m)))
 
 
 def make_application():

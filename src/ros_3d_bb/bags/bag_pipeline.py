@@ -193,16 +193,18 @@ def process_bag(source, target, settings=Settings()):
     Raises BagError if the source cannot be read, ValueError if a parameter is invalid, and OSError if the target cannot
     be written; no target remains then.
     """
-    events = EventCounter()
+    events, made, types = EventCounter(), _outputs_of(settings), {}
     with BagReader(source) as reader, new_bag(target, settings.compression) as bag:
-        run, copy = BagRun(reader, settings, events), _copier(bag, settings)
-        known = set(reader.topics) | _outputs_of(settings)
+        run = BagRun(reader, settings, events)
         for topic in settings.keep or ():
-            if absolute(topic) not in known:
+            if absolute(topic) not in made.union(reader.topics):
                 events.note(NOT_KEPT, 'the bag has no topic /%s; did you mean %s?'
                             % (topic, nearest_name(topic, reader.topics)))
         for raw, outputs in run.outputs():
-            copy(raw)
+            if raw.topic not in made and (settings.keep is None or raw.topic.lstrip('/') in settings.keep):
+                if types.setdefault(raw.topic, raw.md5sum) != raw.md5sum:
+                    raise BagError('%s has messages of two types' % raw.topic)
+                _copy(raw, bag)
             for topic, message in outputs:
                 bag.write(settings.name(topic), message, raw.time)
     return events
@@ -216,17 +218,8 @@ def _outputs_of(settings):
     return made
 
 
-def _copier(bag, settings):
-    """Return a function that copies a Raw to a bag unchanged, except on topics that the pipeline writes."""
-    made, types = _outputs_of(settings), {}
-
-    def copy(raw):
-        if raw.topic in made or settings.keep is not None and raw.topic.lstrip('/') not in settings.keep:
-            return
-        if types.setdefault(raw.topic, raw.md5sum) != raw.md5sum:
-            raise BagError('%s has messages of two types' % raw.topic)
-        unused = type('Unused', (), {'_md5sum': raw.md5sum})  # rosbag requires a class, but uses the connection header
-        bag.write(raw.topic, (raw.datatype, raw.data, raw.md5sum, unused), raw.time, raw=True,
-                  connection_header=raw.connection_header)
-
-    return copy
+def _copy(raw, bag):
+    """Write a Raw to a bag unchanged."""
+    unused = type('Unused', (), {'_md5sum': raw.md5sum})  # rosbag requires a class, but uses the connection header
+    bag.write(raw.topic, (raw.datatype, raw.data, raw.md5sum, unused), raw.time, raw=True,
+              connection_header=raw.connection_header)

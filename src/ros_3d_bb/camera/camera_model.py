@@ -75,8 +75,7 @@ class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float
 
 def transform_from(translation, quaternion):
     """Create a 4x4 matrix from a translation (x, y, z) in metres and a quaternion (x, y, z, w), which is normalised.
-
-    Raises ValueError if the quaternion cannot be normalised (zero, nan or inf).
+    Raises ValueError if it cannot be (zero, nan or inf).
     """
     quaternion = np.asarray(quaternion, float)
     norm = np.sqrt(quaternion.dot(quaternion))

@@ -100,10 +100,7 @@ def boxes2d_to_msg(boxes, header, labels=None, scores=None, image_size=None):
 
 
 def detections2d_to_msg(detections, names, header, image_size):
-    """Convert `detection.boxes.Detections` to std_msgs/Int32MultiArray as `boxes2d_to_msg`.
-
-    `names` are the class names by number.
-    """
+    """Convert `detection.boxes.Detections` as `boxes2d_to_msg`; `names` are the class names by number."""
     return boxes2d_to_msg(detections.boxes, header, [names[number] for number in detections.classes],
                           detections.scores, image_size)
 

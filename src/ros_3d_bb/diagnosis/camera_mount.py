@@ -13,10 +13,7 @@ MIN_PEOPLE, TIMES_MORE = 4, 3  # that are found in rotated images, at least, and
 
 
 class CameraMount(NamedTuple):
-    """Mount of a camera.
-
-    `pose` is None if no floor is visible, `people` is their number in the images for each number of quarter turns.
-    """
+    """Mount of a camera: number of people in the images by quarter turns, and pose; None if no floor is visible."""
 
     images: int
     people: dict

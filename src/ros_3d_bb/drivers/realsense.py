@@ -1,7 +1,4 @@
-"""Driver of RealSense cameras and of their recordings, based on librealsense's Python package `pyrealsense2`.
-
-The package is optional: it is imported when a camera is opened.
-"""
+"""Driver of RealSense cameras and their recordings, with `pyrealsense2`, which is imported when a camera is opened."""
 import os
 import time
 from typing import NamedTuple

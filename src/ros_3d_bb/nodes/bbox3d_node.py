@@ -61,7 +61,7 @@ class Bbox3dNode(object):
     def _reconfigure(self, params):
         with self._inputs.lock:
             self._stage.reconfigure(params)
-            self._inputs.source.assumed_delay_s = params.assumed_delay
+            self._inputs.source.set_assumed_delay(params.assumed_delay)
             self._images.depth_range_m = params.depth_image_range
 
     def on_boxes(self, message):
@@ -175,7 +175,7 @@ class SampleImages(object):
                 for box in boxes:
                     draw_boxes(image, [box.rect_px], [described(box.label, '%.2f m' % box.center_m[2])])
                 for box in boxes:
-                    draw_samples(image, box.rect_px, self._stage.sample(depth, box.rect_px))
+                    draw_samples(image, box.rect_px, self._stage.estimator.sample(depth, box.rect_px))
                 self._color_pub.publish(fill_image(Image(header=header), image, 'rgb8'))
 
     def _subscribe(self, wanted):

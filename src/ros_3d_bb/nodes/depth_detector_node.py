@@ -1,7 +1,6 @@
 """ROS node that detects people in depth and colour images without a trained network."""
 import threading
 
-import rospy
 from sensor_msgs.msg import Image
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC

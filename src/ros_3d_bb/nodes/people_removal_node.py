@@ -96,7 +96,7 @@ class PeopleRemovalNode(object):
 
     def _without_people(self, name, remover, message):
         """Return the message without people, or itself if it is unknown where they are."""
-        newest, _age_s = self._tracks.newest()
+        newest = self._tracks.newest()
         try:
             if newest is not None:
                 ahead_s = (stamp_of(message) - newest.stamp_ns) / NS

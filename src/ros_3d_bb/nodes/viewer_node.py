@@ -219,9 +219,8 @@ class ViewerNode(object):
                                                    self._params.session)
 
     def _snapshot_to_store(self):
-        """Return the newest snapshot.
-
-        Raises ValueError if there is nothing to store, or if the boxes are missing and the user has not been warned.
+        """Return the newest snapshot. Raises ValueError without one, or if boxes are missing and the user was not
+        warned.
         """
         with self._lock:
             snapshot, is_early = self._snapshots.newest, self._snapshots.is_early

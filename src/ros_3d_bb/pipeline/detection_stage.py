@@ -97,10 +97,7 @@ class DepthDetectionStage(object):
         self._params = params
 
     def detect(self, frame):
-        """Return the Detections in the received image of an RgbdFrame; None while the floor is unknown.
-
-        Raises ValueError if the images cannot be used.
-        """
+        """Return the Detections in the received image of an RgbdFrame; None while the floor is unknown."""
         floor = None  # the detector fits it
         if frame.camera_from_floor is not None:
             base_from_floor = transform_from((0, 0, self._params.floor_height), (0, 0, 0, 1))

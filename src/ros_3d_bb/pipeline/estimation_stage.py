@@ -56,19 +56,11 @@ class EstimationStage(object):
         self.reconfigure(params)
 
     def reconfigure(self, params):
-        """Use another estimator or stride for the next boxes.
-
-        Raises ValueError, as the constructor, and keeps the old parameters if the new ones are invalid.
-        """
+        """Use another estimator or stride for the next boxes. If invalid, raise ValueError and keep the old one."""
         estimator = estimator_named(params.estimator, params.stride, self._classes)
         if self._error_model is not None:
             self._error_model.check_estimator(params.estimator)
-        self._estimator = estimator
-
-    @property
-    def sample(self):
-        """The sampling function of the estimator, see `box3d_estimator.Estimator`."""
-        return self._estimator.sample
+        self.estimator = estimator
 
     def estimate(self, frame, boxes2d):
         """Estimate the 3D boxes of one image from its RgbdFrame and Boxes2D.
@@ -78,7 +70,7 @@ class EstimationStage(object):
         """
         usable = self._usable_boxes(boxes2d)
         rects_px = list(map(tuple, frame.upright_rects(usable.boxes).tolist()))
-        estimates = estimate_boxes(frame.depth, rects_px, frame.camera, self._estimator, _level_rotation(frame.up),
+        estimates = estimate_boxes(frame.depth, rects_px, frame.camera, self.estimator, _level_rotation(frame.up),
                                    usable.labels)
         found = [box._replace(score=score) for box, score in zip(estimates, usable.scores.tolist())
                  if box is not None]

@@ -33,7 +33,7 @@ class RgbdSource(object):
     topics : sequence of str
         Topics of the depth images, their camera_info and that of colour, for error messages about missing ones.
     cache_s, assumed_delay_s : float
-        See `StampSynchronizer`; the delay is also an attribute.
+        See `StampSynchronizer`.
     """
 
     def __init__(self, params, events, on_match, transforms=None, topics=DEPTH_TOPICS['aligned'] + INFO_TOPICS[:1],
@@ -46,13 +46,8 @@ class RgbdSource(object):
                                        self._on_frame, self._on_lost)
         self._on_match, self._used_ns = on_match, None
 
-    @property
-    def assumed_delay_s(self):
-        """Latency of the detector, for 2D boxes without a stamp."""
-        return self._sync.assumed_delay_ns / NS
-
-    @assumed_delay_s.setter
-    def assumed_delay_s(self, delay_s):
+    def set_assumed_delay(self, delay_s):
+        """Set the latency of the detector, for 2D boxes without a stamp."""
         self._sync.assumed_delay_ns = int(delay_s * NS)
 
     def add_camera_info(self, message, now_ns):
@@ -78,7 +73,8 @@ class RgbdSource(object):
         boxes2d = boxes2d_from_msg(message)
         if boxes2d.stamp_ns is None and UNSTAMPED not in self._events.counts:
             self._events.note(UNSTAMPED, 'the 2D boxes have no stamp: each array is paired with the depth image that '
-                              'arrived nearest to %.3f s before it (~assumed_delay)' % self.assumed_delay_s)
+                              'arrived nearest to %.3f s before it (~assumed_delay)'
+                              % (self._sync.assumed_delay_ns / NS))
         self._events.count('arrays of 2D boxes')
         self._sync.add_boxes(boxes2d.stamp_ns, now_ns, boxes2d)
 

@@ -51,9 +51,8 @@ NAMES = ['costmap'] + sorted(OPTIONAL)
 
 
 def outputs_from(params):
-    """Create the list of Output that the parameters (`PlannerBridgeParams`) select.
-
-    Raises ValueError if an output is unknown, or the package that it needs is not installed; the message names it.
+    """Create the list of Output that the PlannerBridgeParams select. Raises ValueError if one is unknown or its package
+    is not installed.
     """
     if not params.outputs:
         raise ValueError('parameter ~outputs is empty; some of %s expected' % ', '.join(NAMES))

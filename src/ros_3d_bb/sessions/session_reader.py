@@ -192,10 +192,7 @@ def frame_of(folder, entry):
 
 
 def read_color(frame, camera):
-    """Read the colour image of a frame, (height, width, 3), uint8, RGB, of any size if `camera` is None.
-
-    Raises SessionError.
-    """
+    """Read the colour image of a frame, RGB (h, w, 3), uint8, of any size if `camera` is None. Raises SessionError."""
     image = read_image(frame.color_path, camera)
     if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
         raise SessionError('%s: 8-bit colour image expected' % frame.color_path)

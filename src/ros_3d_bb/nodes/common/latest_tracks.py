@@ -23,22 +23,14 @@ def received_tracks(message, diagnostics):
 
 
 class Tracks(NamedTuple):
-    """Valid tracks of one image; their stamp and frame."""
+    """Valid tracks of one image; their stamp and frame; their age in seconds, as `newest` returns them; and the current
+    pose (4, 4) of their frame in that of the robot, as `RobotTracks.around` returns them."""
 
     tracks: list
     stamp_ns: int
     frame_id: str
-
-
-class TracksAround(NamedTuple):
-    """Tracks with at least the widths of their classes (`with_class_widths`), with their stamp and frame, their age in
-    seconds, and the current pose of their frame in that of the robot, (4, 4)."""
-
-    tracks: list
-    stamp_ns: int
-    frame_id: str
-    age_s: float
-    robot_from_tracks: Any
+    age_s: float = 0.0
+    robot_from_tracks: Any = None
 
 
 class LatestTracks(object):
@@ -58,10 +50,12 @@ class LatestTracks(object):
         subscribe(TRACKS_TOPIC, TrackedObjectArray, self._on_message, 2)
 
     def newest(self):
-        """Return the newest Tracks and their age in seconds; None, 0 if they are too old or the clock went back."""
+        """Return the newest Tracks; None if they are too old or the clock went back."""
         newest = self._newest
-        age_s = 0.0 if newest is None else (rospy.get_rostime().to_nsec() - newest.stamp_ns) / NS
-        return (newest, max(age_s, 0.0)) if newest is not None and abs(age_s) <= self._timeout_s else (None, 0.0)
+        if newest is None:
+            return None
+        age_s = (rospy.get_rostime().to_nsec() - newest.stamp_ns) / NS
+        return newest._replace(age_s=max(age_s, 0.0)) if abs(age_s) <= self._timeout_s else None
 
     def _on_message(self, message):
         with self._diagnostics.receiving('tracks'):
@@ -96,15 +90,14 @@ class RobotTracks(LatestTracks):
         super(RobotTracks, self).__init__(diagnostics, params.timeout, on_tracks)
 
     def around(self):
-        """Return TracksAround, None if the tracks or the pose are older than the timeout, or the pose is unknown."""
-        newest, age_s = self.newest()
-        if newest is None:
-            return None
-        robot_from_tracks = self.robot_from(newest.frame_id)
+        """Return the newest Tracks with at least the widths of their classes (`with_class_widths`); None if they or the
+        pose are older than the timeout, or the pose is unknown."""
+        newest = self.newest()
+        robot_from_tracks = None if newest is None else self.robot_from(newest.frame_id)
         if robot_from_tracks is None:
             return None
-        tracks = with_class_widths(newest.tracks, self._classes)
-        return TracksAround(tracks, newest.stamp_ns, newest.frame_id, age_s, robot_from_tracks)
+        return newest._replace(tracks=with_class_widths(newest.tracks, self._classes),
+                               robot_from_tracks=robot_from_tracks)
 
     def robot_from(self, frame_id):
         """Return the current pose of a frame in that of the robot, (4, 4); None if it is unknown, or older than the
