@@ -76,12 +76,15 @@ def test_3d_boxes_do_not_wait_for_a_master_to_subscribe_colour():
 
 def test_the_diagnostics_continue_after_a_failed_report():
     path = 'ros_3d_bb.nodes.common.diagnostics.'
-    with mock.patch(path + 'NodeUpdater') as updater, mock.patch('rospy.logwarn') as log, \
-            mock.patch(path + 'PERIOD_S', 0.01):
-        updater.return_value.force_update.side_effect = [ZeroDivisionError('by nothing')] + 1000 * [None]
+    with mock.patch('rospy.Publisher') as publisher, mock.patch('rospy.logwarn') as log, \
+            mock.patch('rospy.get_rostime', return_value=rospy.Time(1)), mock.patch(path + 'PERIOD_S', 0.01):
+        publish = publisher.return_value.publish
+        publish.side_effect = [ZeroDivisionError('by nothing')] + 1000 * [None]
         Diagnostics()
-        wait_until(lambda: updater.return_value.force_update.call_count >= 3, 'another report')
+        wait_until(lambda: publish.call_count >= 3, 'another report')
     assert 'by nothing' in log.call_args[0][1]
+    status, = publish.call_args[0][0].status
+    assert (status.name, status.message) == (rospy.get_name()[1:] + ': pipeline', 'no input yet')
 
 
 def test_an_input_subscribed_while_the_others_are_listed_is_kept():
