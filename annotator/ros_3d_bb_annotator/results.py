@@ -51,11 +51,14 @@ class Results(QtCore.QObject):
 
     def analyse(self):
         """Run the noise analysis and open its report. Editing is blocked meanwhile."""
+        def work():
+            from ros_3d_bb_annotator.analysis import analyse  # optional scipy and matplotlib take a second
+            return analyse(document)
         document = self._window.document
         waiting = QtWidgets.QProgressDialog('Fitting the error model…', None, 0, 0, self._window)
         waiting.setWindowTitle('Noise analysis')
         waiting.setWindowModality(Qt.WindowModal)
-        self._work = Work(lambda: _analysed(document), self)
+        self._work = Work(work, self)
         self._work.finished.connect(lambda: self._on_finished(waiting))
         waiting.show()
         self._work.start()
@@ -78,8 +81,3 @@ class Results(QtCore.QObject):
             text += '; %d implausible positions were left out (Ctrl+I)' % len(self.analysis.inputs.outliers)
         self._window.statusBar().showMessage(text)
         QtGui.QDesktopServices.openUrl(QtCore.QUrl.fromLocalFile(str(folder / 'report.html')))
-
-
-def _analysed(document):
-    from ros_3d_bb_annotator.analysis import analyse  # optional scipy and matplotlib take a second
-    return analyse(document)

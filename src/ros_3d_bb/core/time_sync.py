@@ -107,23 +107,13 @@ class StampSynchronizer(object):
     Boxes usually arrive after their depth image, by the latency of the detector. Boxes that arrive first wait for the
     depth image and the camera_info. If that camera_info is lost, the one nearest in time is used as soon as a newer
     message shows the loss. Boxes without a stamp are matched by arrival time, to the depth image that arrived nearest
-    to `assumed_delay_ns` before them. A camera_info without a stamp is used for all images, because intrinsics do not
-    change with time.
+    to `assumed_delay_ns`, an attribute, before them. A camera_info without a stamp is used for all images, because
+    intrinsics do not change with time.
 
-    All boxes are passed to exactly one of the two callbacks, in the order of arrival, by the methods `add_` and `end`.
-
-    Parameters
-    ----------
-    length_ns : int
-        How long images are kept, and how long boxes wait.
-    tolerance_ns : int
-        Largest difference between the stamps of one frame, see `MessageCache.matching`.
-    assumed_delay_ns : int
-        Latency of the detector, for boxes without a stamp; also an attribute.
-    on_frame : callable
-        Called with boxes and depth, both Stamped, and camera of one frame.
-    on_lost : callable
-        Called with unmatched boxes, Stamped, and whether they are lost because time jumped back.
+    Images are kept, and boxes wait, for `length_ns`. The stamps of one frame differ by at most `tolerance_ns`, see
+    `MessageCache.matching`. All boxes are passed to exactly one of two callbacks, in the order of arrival, by the
+    methods `add_` and `end`: `on_frame` with boxes and depth, both Stamped, and camera of one frame, or `on_lost` with
+    unmatched boxes, Stamped, and whether they are lost because time jumped back.
     """
 
     def __init__(self, length_ns, tolerance_ns, assumed_delay_ns, on_frame, on_lost):
@@ -160,7 +150,7 @@ class StampSynchronizer(object):
             if (self._cameras.newest_ns or 0) > stamp_ns + self._length_ns:  # no camera_info of the new time yet
                 self._cameras.clear()
             self._end_before_ns = newest_ns
-            self._lose_waiting(True)
+            self.end(before_jump=True)
         self._match_waiting(now_ns)
 
     def add_camera(self, stamp_ns, now_ns, camera):
@@ -189,11 +179,8 @@ class StampSynchronizer(object):
             self._waiting.append(entry)
             self._match_waiting(now_ns)
 
-    def end(self):
-        """Signal the end of the input: all waiting boxes are lost."""
-        self._lose_waiting(False)
-
-    def _lose_waiting(self, before_jump):
+    def end(self, before_jump=False):
+        """Give up all waiting boxes, at the end of the input or before a time jump."""
         lost, self._waiting = self._waiting, []
         for entry in lost:
             self._on_lost(entry, before_jump)

@@ -28,9 +28,7 @@ class Bbox3dNode(object):
     """Estimate 3D boxes from 2D boxes and depth images.
 
     Each array of 2D boxes is paired with the depth image of the same stamp, regardless of the detector's latency.
-    Parameters: config/bbox3d.yaml; some can be changed at run time. With ~depth raw, the depth images are on
-    camera/depth/image_rect_raw and their camera_info on camera/depth/camera_info; the node registers them to the colour
-    image, using the transform between both cameras in tf.
+    Parameters: config/bbox3d.yaml; some can be changed at run time.
 
     Subscribes
     ----------

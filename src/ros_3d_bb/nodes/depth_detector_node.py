@@ -19,9 +19,7 @@ from ros_3d_bb.pipeline.detection_stage import DepthDetectionStage, DepthDetecto
 class DepthDetectorNode(object):
     """Detect people in depth and colour images.
 
-    No network weights are required. Parameters: config/depth_detector.yaml; most can be changed at run time. With
-    ~depth raw, the depth images are on camera/depth/image_rect_raw and their camera_info on camera/depth/camera_info;
-    the node registers them to the colour image, using the transform between both cameras in tf.
+    No network weights are required. Parameters: config/depth_detector.yaml; most can be changed at run time.
 
     Subscribes
     ----------

@@ -76,7 +76,7 @@ class PeopleRemovalNode(object):
         self._params, self._camera = params, None
         self._diagnostics, self._transforms = Diagnostics(), Transforms(params.tf_timeout)
         self._diagnostics.show('tf age', self._transforms.age)
-        self._tracks = LatestTracks(self._diagnostics, params.timeout, lambda _tracks: None)
+        self._tracks = LatestTracks(self._diagnostics, params.timeout)
         removers = {'scan': self._without_in_scan, 'points': self._without_in_cloud, 'depth': self._without_in_depth}
         self._pubs = {name: rospy.Publisher('~%s_static' % name, KINDS[name], queue_size=2) for name in params.inputs}
         if 'depth' in params.inputs:

@@ -19,21 +19,13 @@ class RgbdSource(object):
     """Pairs colour images or 2D boxes with the depth image and camera_info of their stamp, and makes frames of them.
 
     Each `add_` method validates a message, raising ValueError, and adds it with its arrival time (integer nanoseconds,
-    see `time_sync.StampSynchronizer`).
+    see `time_sync.StampSynchronizer`). `on_match` is called with the arguments of `frame` when the messages of one
+    stamp are complete.
 
-    Parameters
-    ----------
-    params : NamedTuple
-        With ~depth, ~depth_scale, ~stamp_tolerance, ~frame_id, ~floor_frame and ~image_rotation.
-    events : event_counter.EventCounter
-    on_match : callable
-        Called with the arguments of `frame` when the messages of one stamp are complete.
-    transforms
-        As for `tracking_stage.TrackingStage`, for the floor and raw depth; None if neither is used.
-    topics : sequence of str
-        Topics of the depth images, their camera_info and that of colour, for error messages about missing ones.
-    cache_s, assumed_delay_s : float
-        See `StampSynchronizer`.
+    `params` has ~depth, ~depth_scale, ~stamp_tolerance, ~frame_id, ~floor_frame and ~image_rotation. `transforms` is as
+    for `tracking_stage.TrackingStage`, for the floor and raw depth; None if neither is used. `topics` are those of the
+    depth images, their camera_info and that of colour, for error messages about missing ones. `cache_s` and
+    `assumed_delay_s` are for the StampSynchronizer.
     """
 
     def __init__(self, params, events, on_match, transforms=None, topics=DEPTH_TOPICS['aligned'] + INFO_TOPICS[:1],

@@ -44,7 +44,7 @@ class LatestTracks(object):
         Tracks.
     """
 
-    def __init__(self, diagnostics, timeout_s, on_tracks):
+    def __init__(self, diagnostics, timeout_s, on_tracks=lambda _tracks: None):
         self._diagnostics, self._timeout_s, self._on_tracks = diagnostics, timeout_s, on_tracks
         self._newest = None
         subscribe(TRACKS_TOPIC, TrackedObjectArray, self._on_message, 2)
@@ -81,7 +81,7 @@ class RobotTracks(LatestTracks):
         As /tf.
     """
 
-    def __init__(self, diagnostics, params, on_tracks):
+    def __init__(self, diagnostics, params, on_tracks=lambda _tracks: None):
         if not params.robot_frame:
             raise ValueError('parameter ~robot_frame is empty; a frame such as base_link expected')
         self._classes = read_object_classes(params.classes_file)

@@ -19,7 +19,9 @@ class RgbdInputs(object):
     Subscribes
     ----------
     camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
-        Depth image, aligned to the colour image.
+        Depth image, aligned to the colour image. With ~depth raw, the images are on camera/depth/image_rect_raw and
+        their camera_info on camera/depth/camera_info; the node registers them to the colour image, using the transform
+        between both cameras in tf.
     camera/color/camera_info : sensor_msgs/CameraInfo
         Calibration of the colour camera.
     /tf : tf2_msgs/TFMessage
