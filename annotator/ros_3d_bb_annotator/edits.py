@@ -44,7 +44,6 @@ class Edits(object):
         self._enter_truth(self._window.selection, truth_m)
 
     def clear_truth(self):
-        """Remove the truth of the selected person."""
         self._window.pane.truth.forget_typed()
         self._edit(Document.clear_truth)
         self._window.pane.truth.begin()
@@ -80,7 +79,6 @@ class Edits(object):
         self._change_box(Document.replace_box, box_px)
 
     def delete_box(self):
-        """Delete the selected box and its truth."""
         self._edit(Document.delete_box)
 
     def undo(self):

@@ -95,7 +95,6 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
             self.show_measurement(self._next_of(-1, self._is_to_do) or 0 if self.current is None else self.current)
 
     def show_measurement(self, number):
-        """Show a measurement."""
         changed, self.current = number != self.current, number
         self.pane.show_measurement(number)
         if changed and self.pane.truth.has_keyboard():

@@ -217,7 +217,6 @@ def _readout_text(cursor, depth, camera):
 
 
 def _read_pictures(document, number):
-    """Read the Pictures of a measurement."""
     color, color_problem = _read_or_error(document.color, number)
     depth, depth_problem = _read_or_error(document.depth, number)
     shown = None if depth is None else colorize_depth(depth_to_grey(depth, DEPTH_RANGE_M))

@@ -110,7 +110,6 @@ class TruthPanel(QtWidgets.QGroupBox):
         self.entered.emit(truth_m)
 
     def preview(self):
-        """Emit `previewed`."""
         try:
             truth_m = self.read()
         except ValueError:  # no complete position yet

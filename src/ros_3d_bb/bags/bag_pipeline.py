@@ -170,7 +170,6 @@ class BagRun(object):
         return Waiting(raw)
 
     def _process(self, waiting):
-        """Process a message."""
         raw, image, search = waiting
         topic, camera = self._topics.get(raw.topic, UNUSED)
         if topic in (None, STATIC_TOPIC):

@@ -22,7 +22,6 @@ class Param(NamedTuple):
 
     @property
     def allowed(self):
-        """Description of the allowed values."""
         low, high = self.limits
         if self.choices:
             return 'one of ' + ', '.join(self.choices)

@@ -96,7 +96,6 @@ class MessageCache(object):
         return min(in_time, key=lambda entry: abs(entry.arrival_ns - arrival_ns), default=None)
 
     def clear(self):
-        """Delete all entries."""
         self._entries.clear()
         self.newest_ns = None
 

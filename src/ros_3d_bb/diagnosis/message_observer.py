@@ -81,7 +81,6 @@ class Observation(object):
         self.on_message()
 
     def stream(self, published_kind, publishers=()):
-        """Return the observations as a Stream."""
         passed_s = (self._last_ns - self._first_ns) / NS if self._count > 1 else 0.0  # negative after a jump in time
         return Stream(self.role, self.topic, published_kind, publishers, self._count,
                       (self._count - 1) / passed_s if passed_s > 0 else 0.0, tuple(self._stamps_ns), *self._lags_s)

@@ -149,14 +149,14 @@ class SampleImages(object):
         self._raw_pub, self._color_pub, self._depth_pub = (
             rospy.Publisher('ros_3d_bb/' + name, Image, queue_size=1) for name in ('raw', 'color', 'depth'))
         self._cache_ns = int(params.cache_length * NS)
-        self._colors, self._subscriber = MessageCache(self._cache_ns), None
+        self._colors, self._unsubscribe = MessageCache(self._cache_ns), None
         # In a separate thread, because an unresponsive master must not block the 3D boxes.
         self._subscription = NewestWorker(self._subscribe, self._on_error)
 
     def publish(self, header, depth, boxes):
         """Publish the debug images of one set of 3D boxes on the topics that have subscribers."""
         needs_raw, needs_color = self._raw_pub.get_num_connections() > 0, self._color_pub.get_num_connections() > 0
-        if (needs_raw or needs_color) != (self._subscriber is not None):
+        if (needs_raw or needs_color) != (self._unsubscribe is not None):
             self._subscription.offer(needs_raw or needs_color)
         if self._depth_pub.get_num_connections():
             grey = depth_to_grey(depth, self.depth_range_m)
@@ -179,11 +179,11 @@ class SampleImages(object):
     def _subscribe(self, wanted):
         """Subscribe to colour images or unsubscribe from them."""
         patient_master().getPid()  # raises if there is no master, for which rospy would hold a lock, even at Ctrl-C
-        if wanted and self._subscriber is None:
-            self._subscriber = subscribe(COLOR_TOPIC, Image, self._on_color, KEPT_AT_ONCE)
-        elif not wanted and self._subscriber is not None:
-            self._subscriber.unregister()
-            self._subscriber, self._colors = None, MessageCache(self._cache_ns)
+        if wanted and self._unsubscribe is None:
+            self._unsubscribe = subscribe(COLOR_TOPIC, Image, self._on_color, KEPT_AT_ONCE)
+        elif not wanted and self._unsubscribe is not None:
+            self._unsubscribe()
+            self._unsubscribe, self._colors = None, MessageCache(self._cache_ns)
 
     def _on_error(self, error):
         self._diagnostics.warn('colour images not subscribed', 'the ROS master does not respond (%s): the subscription '
@@ -195,5 +195,4 @@ class SampleImages(object):
 
 
 def main():
-    """Run the node."""
     run_node('bbox3d_node', Bbox3dNode)

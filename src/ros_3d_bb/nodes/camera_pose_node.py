@@ -60,8 +60,8 @@ class CameraPoseNode(object):
         self._diagnostics.show('pose', lambda: POSE_TEXT % self._stage.pose if self._is_done else 'unknown')
         depth_topic = DEPTH_TOPICS[params.depth][0]
         info_topic = info_topic_beside(rospy.resolve_name(depth_topic)) if params.depth == RAW else INFO_TOPICS[0]
-        self._subscriptions = [subscribe_camera_info(info_topic, depth_topic, self._on_camera_info, 1),
-                               subscribe(depth_topic, Image, self._on_depth, 1)]
+        self._unsubscribers = (subscribe_camera_info(info_topic, depth_topic, self._on_camera_info, 1),
+                               subscribe(depth_topic, Image, self._on_depth, 1))
 
     def _on_camera_info(self, message):
         with self._diagnostics.receiving('camera_info'), self._lock:
@@ -87,11 +87,10 @@ class CameraPoseNode(object):
                                                     self._stage.floor_from_camera)
         self._broadcaster.sendTransform(transform_messages(stamp, [link]))
         self._is_done = True
-        for subscription in self._subscriptions:
-            subscription.unregister()
+        for unsubscribe in self._unsubscribers:
+            unsubscribe()
         self._diagnostics.note(POSE_FITTED, '%s (from %s to %s)' % ((POSE_TEXT % self._stage.pose,) + link[:2]))
 
 
 def main():
-    """Run the node."""
     run_node('camera_pose_node', CameraPoseNode)

@@ -53,5 +53,4 @@ class DepthDetectorNode(object):
 
 
 def main():
-    """Run the node."""
     run_node('depth_detector_node', DepthDetectorNode)

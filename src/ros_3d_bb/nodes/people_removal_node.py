@@ -129,5 +129,4 @@ class PeopleRemovalNode(object):
 
 
 def main():
-    """Run the node."""
     run_node('people_removal_node', PeopleRemovalNode)

@@ -238,5 +238,4 @@ def _now_ns():
 
 
 def main():
-    """Run the node."""
     run_node('planner_bridge_node', PlannerBridgeNode)

@@ -116,5 +116,4 @@ class SpeedLimitNode(object):
 
 
 def main():
-    """Run the node."""
     run_node('speed_limit_node', SpeedLimitNode)

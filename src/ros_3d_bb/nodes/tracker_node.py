@@ -165,5 +165,4 @@ class TrackIdReservation(object):
 
 
 def main():
-    """Run the node."""
     run_node('tracker_node', TrackerNode)

@@ -322,5 +322,4 @@ def _complain(future):
 
 
 def main():
-    """Run the node."""
     run_node('viewer_node', ViewerNode, ViewerNode.run)

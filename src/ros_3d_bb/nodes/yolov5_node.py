@@ -82,5 +82,4 @@ class Yolov5Node(object):
 
 
 def main():
-    """Run the node."""
     run_node('yolov5_node', Yolov5Node)

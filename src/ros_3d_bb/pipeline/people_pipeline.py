@@ -167,7 +167,6 @@ class PeoplePipeline(object):
                 self._detect(camera, trigger.header, self._sources[camera].frame(trigger, *messages))
 
     def _detect(self, camera, header, frame):
-        """Detect people in a frame, and track them."""
         detections = self._detection_stages[camera].detect(frame)
         if detections is None:
             return

@@ -53,11 +53,9 @@ class RgbdSource(object):
         self._registration.add_camera_info(message)
 
     def add_depth(self, message, now_ns):
-        """Add a depth image."""
         self._sync.add_depth(stamp_of(message), now_ns, message)
 
     def add_color(self, message, now_ns):
-        """Add a colour image."""
         self._sync.add_boxes(stamp_of(message), now_ns, message)
 
     def add_boxes(self, message, now_ns):

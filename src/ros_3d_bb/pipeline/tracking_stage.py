@@ -68,28 +68,13 @@ class TrackingStage(object):
     (integer nanoseconds) on a clock chosen by the caller. The methods are thread-safe. The constructor and
     `reconfigure` raise ValueError if a parameter is invalid.
 
-    Parameters
-    ----------
-    params : TrackerNodeParams
-    tracking : list
-        One instance of each of `TRACKING_PARAMS`.
-    events : event_counter.EventCounter
-    transforms
-        Its `lookup(target_frame, source_frame, stamp)` returns target_from_source (4, 4) or raises
-        tf2_ros.TransformException.
-    on_tracks : callable
-        Called with the tracks (list of `types.TrackedObject`) after each image and their header, which has the newest
-        stamp and the fixed frame. `lock` is held meanwhile.
-    last_id : int
-        The IDs of tracks are greater.
+    `tracking` has one instance of each of `TRACKING_PARAMS`. The method `lookup(target_frame, source_frame, stamp)` of
+    `transforms` returns target_from_source (4, 4) or raises tf2_ros.TransformException. `on_tracks` is called with the
+    tracks (list of `types.TrackedObject`) after each image and their header, which has the newest stamp and the fixed
+    frame; `lock` is held meanwhile. The IDs of tracks are greater than `last_id`.
 
-    Attributes
-    ----------
-    cameras : tuple of str
-        Namespaces of the cameras; '' for a single camera.
-    uses_camera_info, uses_depth : bool
-        Which other messages are used. The thesis tracker considers neither the field of view nor occlusion.
-    lock : threading.RLock
+    Attributes: `cameras`, the namespaces of the cameras; `uses_camera_info` and `uses_depth`, whether these messages
+    are used: the thesis tracker considers neither the field of view nor occlusion; and `lock`.
     """
 
     def __init__(self, params, tracking, events, transforms, on_tracks, last_id=0):
@@ -192,9 +177,9 @@ class TrackingStage(object):
         detections = detections_from_boxes(boxes, fixed_from_camera, self._classes)
         tracks = self._tracker.update(stamp_ns, detections,
                                       self._view(message.header, fixed_from_camera, camera, camera_name))
-        ignored = sum(self._tracker.ignored.contains(detection.position_m, fixed_from_camera[:2, 3])
-                      for detection in detections)
-        if ignored:
+        areas = self._tracker.ignored
+        if areas.polygons or areas.occupied is not None:
+            ignored = sum(areas.contains(detection.position_m, fixed_from_camera[:2, 3]) for detection in detections)
             self._events.count('boxes in ignored areas', ignored)
         self._events.count('images tracked')
         if self._tracker.untracked_boxes > untracked:

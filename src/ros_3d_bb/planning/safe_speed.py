@@ -56,17 +56,9 @@ def highest_safe_speed(tracks, age_s, robot_from_tracks, velocity, params):
     which the body, the robot and `people_clearance` are added. A person in whose ellipse the robot already stands does
     not keep it from leaving.
 
-    Parameters
-    ----------
-    tracks : list of TrackedObject
-    age_s : float
-        Time since the stamp of the tracks.
-    robot_from_tracks : numpy.ndarray, (4, 4)
-        Current pose of the frame of the tracks.
-    velocity : sequence of float
-        Of the robot: along x, along y, and angular. Only the path counts, which is that straight ahead without a
-        linear velocity.
-    params : SafeSpeedParams
+    The stamp of the tracks (TrackedObject) is `age_s` seconds ago; the pose of their frame, (4, 4), is the current one.
+    Of the velocity of the robot, along x, along y and angular, only the path counts, which is that straight ahead
+    without a linear velocity. `params` are SafeSpeedParams.
     """
     speed_mps, robot_m = params.highest_speed, np.linalg.inv(robot_from_tracks)[:3, 3]
     for track in sorted(tracks, key=lambda each: np.linalg.norm(each.position_m - robot_m)):  # the nearest limit most

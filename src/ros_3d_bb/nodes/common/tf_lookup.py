@@ -22,11 +22,9 @@ class _Listener(tf2_ros.TransformListener):
         tf2_ros.TransformListener.__init__(self, buffer, tcp_nodelay=True)
 
     def callback(self, data):
-        """Process a message of /tf."""
         self._add(tf2_ros.TransformListener.callback, data)
 
     def static_callback(self, data):
-        """Process a message of /tf_static."""
         self._add(tf2_ros.TransformListener.static_callback, data)
 
     def _add(self, add, data):
