@@ -95,9 +95,7 @@ class Document(object):
         return plausible(boxes[0])
 
     def known_errors(self, index):
-        """Estimate minus truth (x, z, distance on the floor) of the selected person, metres; None if one is missing, or
-        has not been computed.
-        """
+        """Estimate minus truth (x, z, distance) of the selected person, metres; None if missing or not yet computed."""
         measurement, positions = self.measurements[index], self.estimates.known(index)
         if measurement.truth_m is None or not positions or positions[measurement.person] is None:
             return None

@@ -23,8 +23,7 @@ class LengthEdit(QtWidgets.QLineEdit):
 class TruthPanel(QtWidgets.QGroupBox):
     """Panel of the truth: (x_m, y_m or None, z_m).
 
-    Signals: `entered` when Enter is pressed on a complete position; `previewed` with the current position, or None if
-    it is incomplete.
+    Signals: `entered` when Enter is pressed on a complete position; `previewed` with the current one, or None.
     """
 
     entered = Signal(object)

@@ -112,8 +112,7 @@ def quarter_turns(up):
     """Number of clockwise quarter turns after which the image is upright; `up` (3,) is in the optical frame.
 
     0 for an upright camera, 1 if the left edge of the image is up, 2 if the camera is upside down, 3 if the right edge
-    is up. Also 0 for a camera that points up or down within `STEEP`, where people have no upright direction in the
-    image.
+    is up. Also 0 for a camera that points up or down within `STEEP`: people have no upright direction in its image.
     """
     x_up, y_up = up[:2]
     if np.hypot(x_up, y_up) < STEEP:

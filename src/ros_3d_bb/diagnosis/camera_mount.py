@@ -22,9 +22,7 @@ class CameraMount(NamedTuple):
 
 
 def camera_mount(pairs, camera):
-    """Return the CameraMount of a Camera, from pairs of an RGB image (h, w, 3) and the aligned DepthImage of the same
-    time.
-    """
+    """Return the CameraMount of a Camera, from pairs of an RGB image (h, w, 3) and aligned DepthImage of one time."""
     chosen = [pairs[number] for number in np.unique(np.linspace(0, len(pairs) - 1, IMAGES).astype(int))]
     people = {0: _people_in(chosen, camera, 0)}
     if people[0] < FEW * len(chosen):

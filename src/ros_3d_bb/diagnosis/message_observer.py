@@ -123,8 +123,7 @@ def observations_of(observed, depth_info, topics, seconds, publishers_of=lambda 
 def observe_bag(path, name_of, target_frame, depth='aligned'):
     """Return the Observations of the first BAG_SECONDS of a bag. Raises BagError if it cannot be read.
 
-    `name_of` maps the name of a topic of the nodes to its name in the bag, with a leading slash; `depth` is a parameter
-    of bbox3d_node.
+    `name_of` maps topics of the nodes to their names in the bag, with a leading slash; `depth` is as for bbox3d_node.
     """
     depth_topic, info_topic = DEPTH_TOPICS[depth]
     roles = dict(ROLES, **{DEPTH: ROLES[DEPTH]._replace(name=depth_topic)})

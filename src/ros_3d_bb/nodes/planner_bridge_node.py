@@ -179,9 +179,7 @@ class PlannerBridgeNode(object):
         return transforms
 
     def _send(self, topic, now_ns):
-        """Publish the latest tracks on one topic, in the form its planner requires. Does nothing if the required
-        transform is unknown.
-        """
+        """Publish the latest tracks on one topic, in the form its planner requires, if the transform is known."""
         received, output = self._received, topic.output
         frame_from_tracks = received.transforms.get((output.frame, output.latest_tf))
         if frame_from_tracks is None:

@@ -219,9 +219,7 @@ class ViewerNode(object):
                                                    self._params.session)
 
     def _snapshot_to_store(self):
-        """Return the newest snapshot. Raises ValueError without one, or if boxes are missing and the user was not
-        warned.
-        """
+        """Return the newest snapshot. Raises ValueError without one, or without boxes before the user was warned."""
         with self._lock:
             snapshot, is_early = self._snapshots.newest, self._snapshots.is_early
         if snapshot is None:

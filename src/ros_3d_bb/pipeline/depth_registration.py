@@ -10,8 +10,7 @@ class DepthRegistration(object):
     """Register raw depth images to the colour camera.
 
     `transforms` is as for `tracking_stage.TrackingStage`; the latest transform is used, as the cameras are fixed to
-    each other. `info_topic`, that of the camera_info of the depth camera, is named in the error message if it is
-    missing.
+    each other. `info_topic`, that of the depth camera's camera_info, is named in the error message if it is missing.
     """
 
     def __init__(self, transforms, info_topic):

@@ -71,9 +71,7 @@ class Settings(NamedTuple):
         return absolute(self.names.get(topic, topic))
 
     def source(self, camera, events, on_match, transforms):
-        """Return the RgbdSource of a camera, for both detection and estimation. Raises ValueError if their parameters
-        differ.
-        """
+        """Return the RgbdSource of a camera for detection and estimation. ValueError if their parameters differ."""
         params = self.bbox3d[0]
         for name in DepthDetectorParams._fields if self.detector == 'depth' else ():
             if getattr(params, name, None) != getattr(self.depth[0], name) and name in params._fields:

@@ -24,8 +24,7 @@ class Output(NamedTuple):
     published again while no new tracks arrive; otherwise positions are those at the stamp of the image. `latest_tf`
     states that the planner applies the latest transform, or drops positions for which tf is older than their stamp: the
     stamp is 0, for which tf2 takes the latest transform. `float32` states that the message stores coordinates as
-    float32. `is_emptied` states that an empty array is published when the tracks are outdated; otherwise nothing is
-    published then.
+    float32. `is_emptied` states that an empty array is published when the tracks are outdated; otherwise nothing is.
     """
 
     topic: str

@@ -1,7 +1,6 @@
 """Highest speed at which a robot can stop before it reaches the places where people will be.
 
-Robot frame, metres, radians, seconds. The robot is a disc around the origin of its frame, which moves straight or
-along a circle.
+Robot frame, metres, radians, seconds. The robot is a disc around the origin that moves straight or along a circle.
 """
 import functools
 import math
@@ -81,9 +80,7 @@ def speed_before_corners(corners_m, age_s, velocity, params, corner_params):
 
 
 def limited_velocity(velocity, limit):
-    """Velocity, along x, along y and angular, with at most this speed on the same path. Rotations in place are not
-    limited.
-    """
+    """Velocity, along x, along y and angular, with at most this speed on the same path; rotations in place are kept."""
     speed_mps = math.hypot(*velocity[:2])
     factor = limit / speed_mps if speed_mps > limit else 1.0
     return tuple([factor * part for part in velocity])

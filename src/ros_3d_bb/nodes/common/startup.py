@@ -45,8 +45,7 @@ def launch_places(nodes):
 
 
 def run_node(name, node_class, run=lambda _node: rospy.spin(), parts=()):
-    """Create a node, which consists of `parts` (names of nodes) if any, `run` it (by default until ROS shuts down) and
-    return it.
+    """Create a node (of `parts`, names of nodes, if any), `run` it (by default until ROS shuts down) and return it.
 
     A ValueError of the constructor is a configuration error: it is logged, and the exit status is 1.
     """
