@@ -40,14 +40,6 @@ class RealSenseParams(NamedTuple):
         'machine is too slow. Else it is played as fast as it can be read.')
 
 
-class RgbdFrame(NamedTuple):
-    """Images with one stamp: `color` (h, w, 3), uint8, RGB, and `depth` aligned to it."""
-
-    stamp_ns: int
-    color: np.ndarray
-    depth: DepthImage
-
-
 class Stamps(object):
     """Conversion of librealsense's timestamps to nanoseconds since 1970.
 
@@ -105,7 +97,8 @@ class RealSense(object):
         self.camera = camera_from_intrinsics(color.get_intrinsics())
 
     def read(self):
-        """Return the next RgbdFrame, or None if no images arrive within POLL_MS.
+        """Return the stamp (nanoseconds), the RGB image and the DepthImage aligned to it of the next frame, or None if
+        no images arrive within POLL_MS.
 
         Raises CameraLost if the camera is unplugged or has sent no images for `LOST_S`, and ValueError if the images
         are incomplete; later images may be complete.
@@ -145,8 +138,8 @@ class RealSense(object):
             # Both images get the stamp of depth, because depth determines positions.
             own_clock = depth.get_frame_timestamp_domain() == self._rs.timestamp_domain.hardware_clock
             stamp_ns = self._stamps.stamp_ns(depth.get_timestamp(), own_clock, int(time.time() * NS))
-            return RgbdFrame(stamp_ns, rgb_of(np.array(color.get_data()), color.get_profile().format().name),
-                             DepthImage(np.array(depth.get_data()), self._depth_scale_m))
+            return (stamp_ns, rgb_of(np.array(color.get_data()), color.get_profile().format().name),
+                    DepthImage(np.array(depth.get_data()), self._depth_scale_m))
         except RuntimeError as error:
             raise ValueError('librealsense could not align depth to colour: %s' % error)
 
