@@ -12,7 +12,7 @@ from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.bags.bag_writer import new_bag
 from ros_3d_bb.camera.image_rotation import mounted_camera, turns_for
 from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, IMAGE_KINDS, RAW, STATIC_TOPIC, TF_TOPIC,
-                                               absolute, info_of_images, uncompressed)
+                                               absolute, info_of_images)
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC
 from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.params import nearest_name
@@ -122,7 +122,7 @@ class BagRun(object):
                 if raw.topic == info:
                     stage.add_camera_info(info_of_images(message_in(raw, *INPUTS[info_topic]), depth))
                 else:
-                    stage.add_depth(uncompressed(message_in(raw, *INPUTS[DEPTH_TOPIC])))
+                    stage.add_depth(message_in(raw, *INPUTS[DEPTH_TOPIC]))
             if stage.is_complete:
                 break
         if stage.pose is None:

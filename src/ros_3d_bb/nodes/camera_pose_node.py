@@ -6,8 +6,7 @@ import rospy
 import tf2_ros
 from sensor_msgs.msg import Image
 
-from ros_3d_bb.conversions.camera_msgs import (DEPTH_TOPICS, INFO_TOPICS, RAW, info_topic_beside, transform_messages,
-                                               uncompressed)
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, INFO_TOPICS, RAW, info_topic_beside, transform_messages
 from ros_3d_bb.core.params import DEPTH, DEPTH_SCALE, IMAGE_ROTATION, Param, parameters
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.startup import read_params, run_node
@@ -71,7 +70,7 @@ class CameraPoseNode(object):
         with self._diagnostics.receiving('depth images'), self._lock:
             if self._is_done:
                 return
-            is_visible = self._stage.add_depth(uncompressed(message))
+            is_visible = self._stage.add_depth(message)
             if is_visible is not None:
                 self._diagnostics.count('images processed')
             if is_visible is False:

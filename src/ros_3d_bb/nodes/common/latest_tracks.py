@@ -103,8 +103,7 @@ class RobotTracks(LatestTracks):
         """Return the current pose of a frame in that of the robot, (4, 4); None if it is unknown, or older than the
         timeout."""
         try:
-            robot_from_frame = self._transforms.latest(self._robot_frame, frame_id)
-            age_s = self._transforms.age_of_latest(self._robot_frame, frame_id)
+            robot_from_frame, age_s = self._transforms.latest(self._robot_frame, frame_id)
         except tf2_ros.TransformException as error:
             self._diagnostics.warn('no transform', 'no transform from %s to %s: %s; waiting for it'
                                    % (frame_id, self._robot_frame, error))

@@ -71,16 +71,14 @@ class Transforms(object):
         raise type(fault)(self._explanation(frames, stamp) or str(fault))
 
     def latest(self, target_frame, source_frame):
-        """As `lookup` of the latest transform, which is that received last after a jump in time, too."""
-        self.buffer.forget_later(target_frame, source_frame)
-        return self.lookup(target_frame, source_frame, rospy.Time())
-
-    def age_of_latest(self, target_frame, source_frame):
-        """Age of what `latest` returns, seconds; 0 if only static transforms are between the frames. Raises
-        tf2_ros.TransformException."""
-        frames = target_frame.lstrip('/'), source_frame.lstrip('/')
-        newest = self.buffer.get_latest_common_time(*frames)
-        return max((rospy.get_rostime() - newest).to_sec(), 0.0) if newest and frames[0] != frames[1] else 0.0
+        """Look up the latest transform, which is that received last after a jump in time, too. Returns it, as `lookup`,
+        and its age in seconds, 0 if only static transforms are between the frames."""
+        target, source = target_frame.lstrip('/'), source_frame.lstrip('/')
+        self.buffer.forget_later(target, source)
+        target_from_source = self.lookup(target, source, rospy.Time())
+        newest = self.buffer.get_latest_common_time(target, source)
+        is_static = not newest or target == source
+        return target_from_source, 0.0 if is_static else max((rospy.get_rostime() - newest).to_sec(), 0.0)
 
     def close(self):
         """Unsubscribe from tf."""
