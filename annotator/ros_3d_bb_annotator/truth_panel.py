@@ -51,7 +51,7 @@ class TruthPanel(QtWidgets.QGroupBox):
         if not (keep_typed and self._is_typed):
             self._is_typed = False
             for name, value_m in zip('xyz', truth_m or (None,) * 3):
-                self.fields[name].setText(_text_of(value_m))
+                self.fields[name].setText('' if value_m is None else '%.10g' % round(1000 * value_m, 6))
             self._show_hint(hint)
         self.preview()
 
@@ -132,7 +132,3 @@ def error_text(error_m):
         return 'Error: –'
     return 'Error: <b>X %s, Z %s</b>, distance %s' % (
         length_text(error_m[0], True), length_text(error_m[1], True), length_text(math.hypot(*error_m[:2])))
-
-
-def _text_of(length_m):
-    return '' if length_m is None else '%.10g' % round(1000 * length_m, 6)

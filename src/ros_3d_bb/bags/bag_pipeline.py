@@ -73,7 +73,9 @@ class BagRun(object):
         self._read_depth_cameras()
         with ThreadPoolExecutor(self._settings.searches) as pool:
             for waiting in self._ahead(pool):
-                self._add_transforms(waiting.raw.time.to_nsec() + self._ahead_ns)
+                recorded_until_ns = waiting.raw.time.to_nsec() + self._ahead_ns
+                while self._unread_tf and self._unread_tf[0][0] <= recorded_until_ns:
+                    self._transforms.add(self._unread_tf.popleft()[1])
                 self._process(waiting)
                 yield waiting.raw, self._pipeline.take_results()
         self._pipeline.end()
@@ -83,11 +85,6 @@ class BagRun(object):
             message = message_in(raw, TFMessage)
             self._transforms.add_static(message)
             self._detector_transforms.add_static(message)
-
-    def _add_transforms(self, until_ns):
-        """Add the transforms that were recorded until a time."""
-        while self._unread_tf and self._unread_tf[0][0] <= until_ns:
-            self._transforms.add(self._unread_tf.popleft()[1])
 
     def _set_camera_pose(self):
         """Set the pose of the camera, which tf does not contain.
