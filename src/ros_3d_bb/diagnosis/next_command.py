@@ -29,17 +29,15 @@ def next_command(bag, seen, found):
         return report % quote(bag), 'draws the tracks'
     faults = set(finding.subject for finding in found if finding.fault)
     raw = _raw_topic(seen, 'alignment' in faults)
+    purpose = 'checks the topics that probably are the missing ones' if missing else ''
     if not option and raw and ('alignment' in faults or others.get(DEPTH_TOPIC) == ''):
-        names, option = {name: topic for name, topic in names.items() if name != DEPTH_TOPIC}, ' --depth raw'
-        others = dict({name: topic for name, topic in others.items() if name != DEPTH_TOPIC}, **{
-            name: topic for name, topic in zip(DEPTH_TOPICS[RAW], (raw, info_topic_beside(raw)))
-            if topic.lstrip('/') != name})
-        if all(others.values()):
-            return ('rosrun ros_3d_bb doctor %s%s%s' % (quote(bag), option, _remappings(dict(names, **others))),
-                    'checks the raw depth, which process_bag registers to colour')
-    if missing and all(others.values()):
-        return ('rosrun ros_3d_bb doctor %s%s%s' % (quote(bag), option, _remappings(dict(names, **others))),
-                'checks the topics that probably are the missing ones')
+        option, purpose = ' --depth raw', 'checks the raw depth, which process_bag registers to colour'
+        for topics in (names, others):
+            topics.pop(DEPTH_TOPIC, None)
+        raw_topics = zip(DEPTH_TOPICS[RAW], (raw, info_topic_beside(raw)))
+        others.update((name, topic) for name, topic in raw_topics if topic.lstrip('/') != name)
+    if purpose and all(others.values()):
+        return 'rosrun ros_3d_bb doctor %s%s%s' % (quote(bag), option, _remappings(dict(names, **others))), purpose
     if missing or faults - {'transforms', 'image rotation'}:
         return '', ''
     pose, hint = _pose(seen.mount) if faults else ('', '')
