@@ -8,7 +8,7 @@ platform_packages=(libroslz4-dev libtf2-dev)  # against which two extensions are
 # Python packages of Debian's ROS without compiled code, which run with any Python. The other packages in their folder,
 # such as numpy, are of Debian's Python and Debian's versions.
 ros_modules=(
-  actionlib actionlib_msgs catkin diagnostic_msgs diagnostic_updater dynamic_reconfigure gencpp genlisp genmsg genpy
+  actionlib actionlib_msgs catkin diagnostic_msgs dynamic_reconfigure gencpp genlisp genmsg genpy
   geometry_msgs message_filters move_base_msgs nav_msgs rosbag rosclean roscpp rosgraph rosgraph_msgs roslaunch roslib
   rosmaster rosmsg rosnode rosparam rospy rosservice rostest rostopic rosunit sensor_msgs std_msgs std_srvs tf2_msgs
   tf2_ros visualization_msgs)

@@ -1,51 +1,40 @@
 """Actions of the window with their keyboard shortcuts, in menus."""
-from typing import NamedTuple, Tuple
-
 from ros_3d_bb_annotator.qt import QtGui
 
-
-class Action(NamedTuple):
-    """Menu entry: method that it calls, text, and shortcuts."""
-
-    name: str
-    text: str
-    keys: Tuple[str, ...] = ()
-
-
-LINE = Action('', '')
-MENUS = (
+LINE = ()
+MENUS = (  # of entries: method that it calls, text, and shortcuts
     ('&File', (
-        Action('ask_session', '&Open a session…', ('Ctrl+O',)),
+        ('ask_session', '&Open a session…', 'Ctrl+O'),
         LINE,
-        Action('ask_export', '&Export CSV…', ('Ctrl+E',)),
-        Action('analyse', '&Analyse the noise…', ('Ctrl+Shift+A',)),
+        ('ask_export', '&Export CSV…', 'Ctrl+E'),
+        ('analyse', '&Analyse the noise…', 'Ctrl+Shift+A'),
         LINE,
-        Action('close', '&Quit', ('Ctrl+Q',)))),
+        ('close', '&Quit', 'Ctrl+Q'))),
     ('&Edit', (
-        Action('undo', '&Undo', ('Ctrl+Z',)),
-        Action('redo', '&Redo', ('Ctrl+Shift+Z', 'Ctrl+Y')),
+        ('undo', '&Undo', 'Ctrl+Z'),
+        ('redo', '&Redo', 'Ctrl+Shift+Z', 'Ctrl+Y'),
         LINE,
-        Action('same_as_last', '&Same as last', ('Ctrl+L',)),
-        Action('enter_for_label', 'Enter for &all of this label', ('Ctrl+Shift+L',)),
-        Action('clear_truth', '&Clear the true position', ('Ctrl+Shift+T',)),
-        Action('ask_reject', 'Re&ject…', ('Ctrl+R',)),
-        Action('restore', 'Res&tore', ('Ctrl+Shift+R',)),
+        ('same_as_last', '&Same as last', 'Ctrl+L'),
+        ('enter_for_label', 'Enter for &all of this label', 'Ctrl+Shift+L'),
+        ('clear_truth', '&Clear the true position', 'Ctrl+Shift+T'),
+        ('ask_reject', 'Re&ject…', 'Ctrl+R'),
+        ('restore', 'Res&tore', 'Ctrl+Shift+R'),
         LINE,
-        Action('delete_box', 'D&elete the box', ('Del', 'Ctrl+Shift+D')),
+        ('delete_box', 'D&elete the box', 'Del', 'Ctrl+Shift+D'),
         LINE,
-        Action('edit_marks', '&Floor marks…', ('Ctrl+G',)))),
+        ('edit_marks', '&Floor marks…', 'Ctrl+G'))),
     ('&Go', (
-        Action('next', '&Next measurement', ('PgDown',)),
-        Action('previous', '&Previous measurement', ('PgUp',)),
-        Action('next_new', 'Next measurement to &do', ('Ctrl+N',)),
-        Action('next_implausible', 'Next &implausible position', ('Ctrl+I',)),
+        ('next', '&Next measurement', 'PgDown'),
+        ('previous', '&Previous measurement', 'PgUp'),
+        ('next_new', 'Next measurement to &do', 'Ctrl+N'),
+        ('next_implausible', 'Next &implausible position', 'Ctrl+I'),
         LINE,
-        Action('go_to_truth', 'Focus the &true position', ('F4',)))),
+        ('go_to_truth', 'Focus the &true position', 'F4'))),
     ('&Person', tuple(
-        Action('choose_%d' % number, 'Box &%d' % number, ('%d' % number, 'Alt+%d' % number))
+        ('choose_%d' % number, 'Box &%d' % number, '%d' % number, 'Alt+%d' % number)
         for number in range(1, 10))),
     ('&View', (
-        Action('fit', '&Whole image', ('0', 'Ctrl+0')),)))
+        ('fit', '&Whole image', '0', 'Ctrl+0'),)))
 
 
 def build_menus(window):
@@ -57,12 +46,13 @@ def build_menus(window):
             if entry == LINE:
                 menu.addSeparator()
                 continue
-            action = menu.addAction(entry.text)
-            action.setShortcuts([QtGui.QKeySequence(key) for key in entry.keys])
-            action.setToolTip('%s (%s)' % (_plain(entry.text), ', '.join(entry.keys)))
-            action.setIconText(_plain(entry.text).replace('Enter for all', 'All'))  # of buttons
-            action.triggered.connect(lambda _checked, call=window.handler(entry.name): call())
-            actions[entry.name] = action
+            name, text, *keys = entry
+            action = menu.addAction(text)
+            action.setShortcuts([QtGui.QKeySequence(key) for key in keys])
+            action.setToolTip('%s (%s)' % (_plain(text), ', '.join(keys)))
+            action.setIconText(_plain(text).replace('Enter for all', 'All'))  # of buttons
+            action.triggered.connect(lambda _checked, call=window.handler(name): call())
+            actions[name] = action
     return actions
 
 

@@ -1,7 +1,6 @@
 """Noise analysis of a session. The figures and the error model are written to a folder. Needs scipy and matplotlib."""
 import os
 import pathlib
-from typing import Any, NamedTuple, Tuple
 
 from ros_3d_bb_annotator.document import ESTIMATOR
 from ros_3d_bb_lab.evaluation.noise.analysis import Inputs, analyse as analyse_noise
@@ -9,29 +8,15 @@ from ros_3d_bb_lab.evaluation.noise.report import text_of, write_results
 from ros_3d_bb_lab.evaluation.noise.tables import read_session_measurements
 
 
-class Analysed(NamedTuple):
-    """Results of an analysis.
-
-    `text` contains mean error and spread of both axes. `model_note` is why there is no error model, or empty.
-    `outliers` were left out.
-    """
-
-    folder: str
-    report_path: str
-    text: str
-    model_note: str
-    outliers: Tuple[Any, ...]
-
-
 def analyse(document, folder=None, estimator=ESTIMATOR):
     """Analyse the errors of the annotated measurements of a document. Writes report, figures and error model.
 
     The results are written to `folder`, by default `analysis` in the session. `estimator` is 'foreground', 'median', or
-    'recorded' for the stored estimates. Raises ValueError if there are too few measurements.
+    'recorded' for the stored estimates. Returns the Analysis of the lab, a summary as text, and the folder
+    (pathlib.Path). Raises ValueError if there are too few measurements.
     """
     folder = pathlib.Path(folder or os.path.join(document.folder, 'analysis'))
     measurements = read_session_measurements(document.folder, estimator)
     analysis = analyse_noise(Inputs.of_session(measurements, estimator, 'unknown'))
     write_results(folder, analysis)
-    return Analysed(str(folder), str(folder / 'report.html'), text_of(analysis), analysis.model_note,
-                    analysis.inputs.outliers)
+    return analysis, text_of(analysis), folder

@@ -39,13 +39,13 @@ def _show(folder):
 
 def _analyse(document, arguments):
     from ros_3d_bb_annotator.analysis import analyse  # imports scipy and matplotlib
-    analysed = analyse(document, arguments.out, arguments.estimator or ESTIMATOR)
-    for outlier in analysed.outliers:
+    analysis, text, folder = analyse(document, arguments.out, arguments.estimator or ESTIMATOR)
+    for outlier in analysis.inputs.outliers:
         print('annotator: left out of the analysis:', outlier, file=sys.stderr)
-    print(analysed.text)
-    if analysed.model_note:
-        print('annotator: note: %s' % analysed.model_note, file=sys.stderr)
-    print('report: %s' % analysed.report_path)
+    print(text)
+    if analysis.model_note:
+        print('annotator: note: %s' % analysis.model_note, file=sys.stderr)
+    print('report: %s' % (folder / 'report.html'))
 
 
 def _validate(document):

@@ -9,15 +9,15 @@ import os
 import numpy as np
 
 from ros_3d_bb.camera.depth_image import FARTHEST_M
-from ros_3d_bb.core.atomic_file import FILE_NAME, locked_update
 from ros_3d_bb.estimation.box3d import plausible
 from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named, level_rotation
-from ros_3d_bb.sessions.session_reader import (Session, SessionError, camera_of, boxes_of_others, read_color,
+from ros_3d_bb.sessions.session_reader import (FILE_NAME, Session, SessionError, boxes_of_others, camera_of, read_color,
                                                read_depth, read_description, session_errors)
+from ros_3d_bb.sessions.session_writer import locked_update
 from ros_3d_bb_annotator.entries import (Edit, changed, detections_of, drawn, entry_at, grid_of, mark_entry,
                                          truth_entry, with_detections, with_person)
 from ros_3d_bb_annotator.estimates import Estimates
-from ros_3d_bb_annotator.measurement import ANNOTATED, FileNames, measurement_of
+from ros_3d_bb_annotator.measurement import ANNOTATED, measurement_of
 
 ESTIMATOR = 'foreground'  # the default of bbox3d_node
 
@@ -95,13 +95,8 @@ class Document(object):
                                level_rotation(self.measurements[index].up))
         return plausible(boxes[0])
 
-    def errors(self, index):
-        """Estimate minus truth (x, z, distance on the floor) of the selected person, metres; None if one is missing."""
-        self.estimates.of(index)
-        return self.known_errors(index)
-
     def known_errors(self, index):
-        """Errors as from `errors`, or None if the estimate has not been computed."""
+        """Estimate minus truth (x, z, distance) of the selected person, metres; None if missing or not yet computed."""
         measurement, positions = self.measurements[index], self.estimates.known(index)
         if measurement.truth_m is None or not positions or positions[measurement.person] is None:
             return None
@@ -200,10 +195,7 @@ class Document(object):
         self._edit((index, dict(with_detections(detections), person=None,
                                 truth_mm=detections[0].pop('truth_mm', None) if detections else None)))
 
-    def reject(self, index, reason):
-        self.reject_all([index], reason)
-
-    def reject_all(self, indices, reason):
+    def reject(self, indices, reason):
         """Reject measurements, which is undone in one step."""
         if not reason.strip():
             raise ValueError('a reason is needed to reject a measurement')
@@ -287,10 +279,10 @@ class Document(object):
 
     def _update(self, content):
         """Update from the content of frames.json. Unchanged measurements are not parsed again."""
-        frames, old, files = content['frames'], self._content['frames'], FileNames()
+        frames, old = content['frames'], self._content['frames']
         self.measurements = tuple(
             self.measurements[index] if index < len(old) and old[index] == entry
-            else measurement_of(self.folder, entry, files) for index, entry in enumerate(frames))
+            else measurement_of(self.folder, entry) for index, entry in enumerate(frames))
         self.grid, self._content = grid_of(content), content
         self.progress = sum(measurement.is_done for measurement in self.measurements), len(self.measurements)
         self.estimates.update()

@@ -15,9 +15,9 @@ class Edits(object):
     def __init__(self, window):
         self._window = window
 
-    def enter_truth(self, x_m, z_m, y_m=None):
-        """Set the truth of the selected measurements, and go to the next measurement."""
-        self._enter_truth(self._window.selection, (x_m, y_m, z_m))
+    def enter_truth(self, truth_m):
+        """Set the truth (x, y, z) of the selected measurements, and go to the next measurement."""
+        self._enter_truth(self._window.selection, truth_m)
 
     def enter_for_label(self):
         """Set the typed or offered truth of all measurements with the current label that are not done."""
@@ -26,13 +26,13 @@ class Edits(object):
             window.pane.truth.show_problem('The measurement has no label')
             return
         try:
-            x_m, z_m, y_m = window.pane.truth.read()
+            truth_m = window.pane.truth.read()
         except ValueError as error:
             window.pane.truth.show_problem(str(error))
             return
         self._enter_truth([index for index, other in enumerate(window.document.measurements)
                            if index == window.current or (other.label == window.measurement.label and not other.is_done
-                                                          and other.detections)], (x_m, y_m, z_m))
+                                                          and other.detections)], truth_m)
 
     def same_as_last(self):
         """Set the truth of the last annotated measurement, and go to the next measurement."""
@@ -44,7 +44,6 @@ class Edits(object):
         self._enter_truth(self._window.selection, truth_m)
 
     def clear_truth(self):
-        """Remove the truth of the selected person."""
         self._window.pane.truth.forget_typed()
         self._edit(Document.clear_truth)
         self._window.pane.truth.begin()
@@ -54,7 +53,7 @@ class Edits(object):
         indices = self._window.selection
         reason = dialogs.ask_reason(self._window, [self._window.document.measurements[index].id for index in indices])
         if reason:
-            self._enter(lambda document: document.reject_all(indices, reason), '%d rejected' % len(indices))
+            self._enter(lambda document: document.reject(indices, reason), '%d rejected' % len(indices))
 
     def restore(self):
         self._edit(Document.restore)
@@ -80,7 +79,6 @@ class Edits(object):
         self._change_box(Document.replace_box, box_px)
 
     def delete_box(self):
-        """Delete the selected box and its truth."""
         self._edit(Document.delete_box)
 
     def undo(self):
@@ -123,7 +121,7 @@ class Edits(object):
         window, index = self._window, self._window.current
         if self._edit(lambda document, _index: edit(document)):
             window.last_entry.setText('<b>%s</b>: %s' % (
-                window.measurement.id, text or error_text(window.document.errors(index))))
+                window.measurement.id, text or error_text(window.document.known_errors(index))))
             window.next_new()
 
     def _edit(self, edit, *values):

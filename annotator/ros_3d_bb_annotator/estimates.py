@@ -7,10 +7,8 @@ MANY = 500  # measurements, of which a single one has no influence on the likely
 
 
 class Estimates(object):
-    """Estimates of the boxes of a document from its depth images.
-
-    They are computed once for the boxes of a measurement. `known`, `outlier` and `implausible` use what has been
-    computed.
+    """Estimates of the boxes of a document from its depth images, computed once for the boxes of a measurement.
+    `known`, `outlier` and `implausible` use what has been computed.
     """
 
     def __init__(self, document):

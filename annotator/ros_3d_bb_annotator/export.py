@@ -34,10 +34,7 @@ def rows_of(document, estimator):
 
 
 def export(document, path, estimator):
-    """Write the table to a CSV file atomically, and return the number of rows.
-
-    Raises SessionError if no measurement is annotated, or the file cannot be written.
-    """
+    """Write the table to a CSV file. Returns the number of rows. Raises SessionError if there are none, or it fails."""
     rows = list(rows_of(document, estimator))
     if not rows:
         raise SessionError('%s: no annotated measurement with an estimate; there is nothing to export'

@@ -23,9 +23,6 @@ class FloorScene(NamedTuple):
     sight: Tuple[float, float]
 
 
-EMPTY = FloorScene((), None, None, (0.0, 0.0))
-
-
 class GridView(QtWidgets.QWidget):
     """Top view of the floor. `mark_chosen` is emitted with a Mark that is clicked."""
 
@@ -33,7 +30,7 @@ class GridView(QtWidgets.QWidget):
 
     def __init__(self, parent=None):
         super(GridView, self).__init__(parent)
-        self._scene, self._pointed = EMPTY, None
+        self._scene, self._pointed = FloorScene((), None, None, (0.0, 0.0)), None
         self.setMouseTracking(True)
         self.setMinimumSize(160, 160)
         self.setAccessibleName('floor from above')

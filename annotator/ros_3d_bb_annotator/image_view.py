@@ -20,7 +20,7 @@ class ImageView(QtWidgets.QWidget):
     def __init__(self, name, shared, parent=None):
         super(ImageView, self).__init__(parent)
         self._name, self._shared = name, shared
-        self.image, self.message, self._scene = None, '', marking.NOTHING
+        self.image, self.message, self._scene = None, '', marking.Scene((), None, ())
         self._pressed_at, self._panned_from, self._grabbed = None, None, ()
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.ClickFocus)

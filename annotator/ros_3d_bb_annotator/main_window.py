@@ -95,7 +95,6 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
             self.show_measurement(self._next_of(-1, self._is_to_do) or 0 if self.current is None else self.current)
 
     def show_measurement(self, number):
-        """Show a measurement."""
         changed, self.current = number != self.current, number
         self.pane.show_measurement(number)
         if changed and self.pane.truth.has_keyboard():
@@ -210,7 +209,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self.pane.shared.box_drawn.connect(self.edits.add_box)
         self.pane.shared.box_edited.connect(self.edits.replace_box)
         self.pane.truth.entered.connect(self.edits.enter_truth)
-        self.pane.floor.mark_chosen.connect(lambda mark: self.edits.enter_truth(mark.x_m, mark.z_m))
+        self.pane.floor.mark_chosen.connect(lambda mark: self.edits.enter_truth((mark.x_m, None, mark.z_m)))
 
 
 def make_application():

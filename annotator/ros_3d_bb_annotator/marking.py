@@ -39,9 +39,6 @@ class Scene(NamedTuple):
         return next((box for box in self.boxes if box.number == self.person), None)
 
 
-NOTHING = Scene((), None, ())
-
-
 def paint_scene(painter, transform, scene):
     for samples in scene.samples:
         _paint_samples(painter, transform, samples)

@@ -21,8 +21,7 @@ class EditedMeasurement(NamedTuple):
     """One measurement, with the fields of `session_reader.Measurement`.
 
     `person` is the selected detection, or None without detections, and `truth_m` its true position (x, y, z), where y
-    may be None; `stamp_text` is
-    '<secs>.<nsecs>' or empty; `problem` is the fault of an invalid measurement or None.
+    may be None; `stamp_text` is '<secs>.<nsecs>' or empty; `problem` is the fault of an invalid measurement or None.
     """
 
     id: str
@@ -64,11 +63,6 @@ class EditedMeasurement(NamedTuple):
             truths[self.person] = self.truth_m
         return truths
 
-    @property
-    def recorded_m(self):
-        """Stored estimate of the person, (3,) or None."""
-        return None if self.person is None else self.detections[self.person].estimate_m
-
 
 def truth_of(annotated):
     """True position (x, y, z) of a measurement or detection of `session_reader`; None if not annotated."""
@@ -77,27 +71,8 @@ def truth_of(annotated):
     return float(annotated.truth_m[0]), annotated.truth_y_m, float(annotated.truth_m[1])
 
 
-class FileNames(object):
-    """Set of existing files, which lists each folder once."""
-
-    def __init__(self):
-        self._names = {}
-
-    def __contains__(self, path):
-        folder, name = os.path.split(path)
-        if folder not in self._names:
-            try:
-                self._names[folder] = set(os.listdir(folder))
-            except OSError:
-                self._names[folder] = set()
-        return name in self._names[folder]
-
-
-def measurement_of(folder, entry, files):
-    """Measurement of an entry of the session in a folder; `files` are FileNames.
-
-    An invalid entry gives a measurement with a `problem`.
-    """
+def measurement_of(folder, entry):
+    """Measurement of an entry of the session in a folder; that of an invalid entry has a `problem`."""
     known = entry if isinstance(entry, dict) else {}
     try:
         with session_errors('frames.json'):
@@ -105,7 +80,8 @@ def measurement_of(folder, entry, files):
     except SessionError as error:
         return EditedMeasurement(str(known.get('id', '')), '', '', problem=str(error),
                                  rejected=str(known['rejected']) if known.get('rejected') else None)
-    missing = [os.path.relpath(path, folder) for path in (frame.color_path, frame.depth_path) if path not in files]
+    missing = [os.path.relpath(path, folder) for path in (frame.color_path, frame.depth_path)
+               if not os.path.exists(path)]
     return EditedMeasurement(
         frame.id, frame.color_path, frame.depth_path, str(entry.get('stamp') or ''), frame.label, frame.detections,
         frame.person if frame.detections else None, truth_of(frame), frame.rejected,

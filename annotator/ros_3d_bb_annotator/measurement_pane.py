@@ -1,7 +1,11 @@
 """View of one measurement: images, people, truth, and position on the floor."""
 import html
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from ros_3d_bb.estimation.box3d_estimator import estimator_named
+from ros_3d_bb.visualization.image_overlay import DEPTH_RANGE_M, colorize_depth, depth_to_grey
 from ros_3d_bb_annotator.document import ESTIMATOR
 from ros_3d_bb_annotator.grid_view import FloorScene, GridView
 from ros_3d_bb_annotator.image_view import ImageView
@@ -9,14 +13,23 @@ from ros_3d_bb_annotator.lengths import length_text, position_text
 from ros_3d_bb_annotator.marking import MarkedBox, Scene
 from ros_3d_bb_annotator.measurement import NOBODY
 from ros_3d_bb_annotator.measurement_list import COLORS, IMPLAUSIBLE
-from ros_3d_bb_annotator.pictures import read_pictures
-from ros_3d_bb_annotator.qt import Qt, QtWidgets, Signal
+from ros_3d_bb_annotator.qt import Qt, QtGui, QtWidgets, Signal
 from ros_3d_bb_annotator.shared_view import SharedView
 from ros_3d_bb_annotator.truth_panel import TruthPanel, error_text
 from ros_3d_bb_annotator.validation import truth_problems
 
 NOBODY_TEXT = 'Nobody was found: draw a box around the person (Shift and drag), or reject the measurement (Ctrl+R).'
 HEADER = '<span style="font-size: large"><b>%s</b></span> &nbsp; <b style="color: %s">%s</b> &nbsp; %s'
+
+
+class Pictures(NamedTuple):
+    """QImages of a measurement or None, with the problems, and the DepthImage or None."""
+
+    color_image: Any
+    color_problem: str
+    depth_image: Any
+    depth_problem: str
+    depth: Any
 
 
 class MeasurementPane(QtWidgets.QWidget):
@@ -65,7 +78,7 @@ class MeasurementPane(QtWidgets.QWidget):
         self._measurement = measurement = self._document.measurements[number]
         images = measurement.id, measurement.color_path, measurement.depth_path
         if images != self._shown_images:
-            self._shown, self._shown_images = read_pictures(self._document, number), images
+            self._shown, self._shown_images = _read_pictures(self._document, number), images
         pictures = self._shown
         self._document.estimates.of(number, pictures.depth)
         self._show_header(measurement)
@@ -201,3 +214,26 @@ def _readout_text(cursor, depth, camera):
     x_m, y_m, z_m = camera.deproject(cursor, depth_m).tolist()
     return text + '    depth %s    X %s  Y %s  Z %s' % (
         length_text(depth_m), length_text(x_m, True), length_text(y_m, True), length_text(z_m))
+
+
+def _read_pictures(document, number):
+    color, color_problem = _read_or_error(document.color, number)
+    depth, depth_problem = _read_or_error(document.depth, number)
+    shown = None if depth is None else colorize_depth(depth_to_grey(depth, DEPTH_RANGE_M))
+    return Pictures(_image_of(color), color_problem, _image_of(shown), depth_problem, depth)
+
+
+def _image_of(rgb):
+    """Convert an image (height, width, 3), uint8, RGB, or None to a QImage or None."""
+    if rgb is None:
+        return None
+    rgb = np.ascontiguousarray(rgb)
+    height, width = rgb.shape[:2]
+    return QtGui.QImage(rgb.data, width, height, 3 * width, QtGui.QImage.Format_RGB888).copy()
+
+
+def _read_or_error(read, number):
+    try:
+        return read(number), ''
+    except (ValueError, OSError) as error:
+        return None, str(error)

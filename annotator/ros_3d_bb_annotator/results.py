@@ -22,11 +22,11 @@ class Work(QtCore.QThread):
 
 
 class Results(QtCore.QObject):
-    """Exports and analyses the document of a window. `analysed` is the last `analysis.Analysed`."""
+    """Exports and analyses the document of a window. `analysis` is the last one, see `analysis.analyse`."""
 
     def __init__(self, window):
         super(Results, self).__init__(window)
-        self._window, self._work, self.analysed = window, None, None
+        self._window, self._work, self.analysis = window, None, None
 
     @property
     def is_busy(self):
@@ -51,11 +51,14 @@ class Results(QtCore.QObject):
 
     def analyse(self):
         """Run the noise analysis and open its report. Editing is blocked meanwhile."""
+        def work():
+            from ros_3d_bb_annotator.analysis import analyse  # optional scipy and matplotlib take a second
+            return analyse(document)
         document = self._window.document
         waiting = QtWidgets.QProgressDialog('Fitting the error model…', None, 0, 0, self._window)
         waiting.setWindowTitle('Noise analysis')
         waiting.setWindowModality(Qt.WindowModal)
-        self._work = Work(lambda: _analysed(document), self)
+        self._work = Work(work, self)
         self._work.finished.connect(lambda: self._on_finished(waiting))
         waiting.show()
         self._work.start()
@@ -71,15 +74,10 @@ class Results(QtCore.QObject):
         if self._work.error is not None:
             dialogs.show_error(self._window, 'The noise analysis failed', self._work.error)
             return
-        self.analysed = self._work.result
-        text = ('Report and figures are in %s; %s' % (self.analysed.folder, self.analysed.model_note)
-                if self.analysed.model_note else 'Report, figures and error model are in %s' % self.analysed.folder)
-        if self.analysed.outliers:
-            text += '; %d implausible positions were left out (Ctrl+I)' % len(self.analysed.outliers)
+        self.analysis, _text, folder = self._work.result
+        text = ('Report and figures are in %s; %s' % (folder, self.analysis.model_note)
+                if self.analysis.model_note else 'Report, figures and error model are in %s' % folder)
+        if self.analysis.inputs.outliers:
+            text += '; %d implausible positions were left out (Ctrl+I)' % len(self.analysis.inputs.outliers)
         self._window.statusBar().showMessage(text)
-        QtGui.QDesktopServices.openUrl(QtCore.QUrl.fromLocalFile(self.analysed.report_path))
-
-
-def _analysed(document):
-    from ros_3d_bb_annotator.analysis import analyse  # optional scipy and matplotlib take a second
-    return analyse(document)
+        QtGui.QDesktopServices.openUrl(QtCore.QUrl.fromLocalFile(str(folder / 'report.html')))

@@ -21,13 +21,12 @@ class LengthEdit(QtWidgets.QLineEdit):
 
 
 class TruthPanel(QtWidgets.QGroupBox):
-    """Panel of the truth.
+    """Panel of the truth: (x_m, y_m or None, z_m).
 
-    Signals: `entered` with (x_m, z_m, y_m or None) when Enter is pressed on a complete position; `previewed` with the
-    current (x_m, y_m or None, z_m), or None if incomplete.
+    Signals: `entered` when Enter is pressed on a complete position; `previewed` with the current one, or None.
     """
 
-    entered = Signal(float, float, object)
+    entered = Signal(object)
     previewed = Signal(object)
 
     def __init__(self, parent=None):
@@ -52,7 +51,7 @@ class TruthPanel(QtWidgets.QGroupBox):
         if not (keep_typed and self._is_typed):
             self._is_typed = False
             for name, value_m in zip('xyz', truth_m or (None,) * 3):
-                self.fields[name].setText(_text_of(value_m))
+                self.fields[name].setText('' if value_m is None else '%.10g' % round(1000 * value_m, 6))
             self._show_hint(hint)
         self.preview()
 
@@ -71,7 +70,7 @@ class TruthPanel(QtWidgets.QGroupBox):
         self._show_hint(text, 'color: %s; font-weight: bold' % WARNING)
 
     def read(self):
-        """Return (x_m, z_m, y_m or None). Raises ValueError with the name of the invalid field."""
+        """Return the typed position. Raises ValueError with the name of the invalid field."""
         values_m = {}
         for name, field in self.fields.items():
             if name == 'y' and not field.text().strip():
@@ -80,7 +79,7 @@ class TruthPanel(QtWidgets.QGroupBox):
                 values_m[name] = parse_length(field.text())
             except ValueError as error:
                 raise ValueError('%s: %s' % (name.upper(), error if field.text().strip() else 'a length is missing'))
-        return values_m['x'], values_m['z'], values_m.get('y')
+        return values_m['x'], values_m.get('y'), values_m['z']
 
     def _lay_out(self):
         form = QtWidgets.QFormLayout(self)
@@ -102,21 +101,19 @@ class TruthPanel(QtWidgets.QGroupBox):
 
     def _on_enter(self):
         try:
-            position = self.read()
+            truth_m = self.read()
         except ValueError as error:
             self.show_problem(str(error))
             self.fields[str(error)[0].lower()].setFocus()
             return
-        self.entered.emit(*position)
+        self.entered.emit(truth_m)
 
     def preview(self):
-        """Emit `previewed`."""
         try:
-            x_m, z_m, y_m = self.read()
+            truth_m = self.read()
         except ValueError:  # no complete position yet
-            self.previewed.emit(None)
-            return
-        self.previewed.emit((x_m, y_m, z_m))
+            truth_m = None
+        self.previewed.emit(truth_m)
 
     def show_error(self, error_text, warning):
         """Show the error of the typed position, and a warning about it or an empty text."""
@@ -135,7 +132,3 @@ def error_text(error_m):
         return 'Error: –'
     return 'Error: <b>X %s, Z %s</b>, distance %s' % (
         length_text(error_m[0], True), length_text(error_m[1], True), length_text(math.hypot(*error_m[:2])))
-
-
-def _text_of(length_m):
-    return '' if length_m is None else '%.10g' % round(1000 * length_m, 6)

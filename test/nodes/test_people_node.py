@@ -70,13 +70,13 @@ def test_the_publisher_decides_the_type_of_images():
     for name, message in (('plain', image), ('other', String('no image')), ('compressed', CompressedImage(
             **compressed_fields(image, 'compressedDepth rvl')))):
         received[name] = []
-        subscriber = subscribe('images/' + name, Image, received[name].append)
+        unsubscribe = subscribe('images/' + name, Image, received[name].append)
         sender = publisher('images/' + name, type(message))
         for _message in range(2):
             sender.publish(message)
         if name != 'other':
             wait_until(lambda: len(received[name]) == 2, name)
-        subscriber.unregister()
+        unsubscribe()
         assert [type(each) for each in received[name]] == [type(message)] * (0 if name == 'other' else 2)
     np.testing.assert_array_equal(imgmsg_to_depth(received['compressed'][0]).values, np.full((48, 64), 2000))
 

@@ -86,7 +86,7 @@ def masterless(params=()):
         'rospy.logwarn_throttle': lambda _period_s, text, *arguments: text % arguments,
         'ros_3d_bb.nodes.common.tf_lookup.TransformBuffer': connections._buffer,
         'ros_3d_bb.nodes.common.subscribers._inputs': [],
-        'ros_3d_bb.nodes.common.diagnostics.NodeUpdater': mock.Mock(),
+        'ros_3d_bb.nodes.common.diagnostics.Diagnostics._run': mock.Mock(),
         'ros_3d_bb.nodes.common.detector_output.NewestWorker': immediate_worker,
         'ros_3d_bb.nodes.people_node.NewestWorker': immediate_worker,
         'ros_3d_bb.nodes.tracker_node.NewestWorker': immediate_worker,

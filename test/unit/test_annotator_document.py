@@ -52,7 +52,7 @@ def test_after_any_edits_the_file_is_what_is_shown_and_undo_leads_back(tmp_path_
             getattr(document, kind)()
         else:
             {'truth': lambda: document.set_truths([index], number, 1 + number), 'reject': lambda: document.reject(
-                index, 'no'), 'restore': lambda: document.restore(index),
+                [index], 'no'), 'restore': lambda: document.restore(index),
              'person': lambda: document.choose_person(index, number)}[kind]()
     shown, saved = ([(one.truth_m, one.person, one.rejected) for one in source.measurements]
                     for source in (document, Document.open(folder)))
@@ -100,7 +100,7 @@ def test_an_edit_that_cannot_be_saved_raises_an_error_and_changes_nothing(docume
 
 def test_the_truth_belongs_to_the_nearest_box_unless_one_was_selected(document):
     document.set_truths([0], 0.72, 2.9)
-    assert document.measurements[0].person == 1 and document.errors(0)[2] < 0.25
+    assert document.measurements[0].person == 1 and document.known_errors(0)[2] < 0.25
     document.choose_person(1, 0)
     document.set_truths([1], 0.72, 2.9)
     assert document.measurements[1].person == 0

@@ -38,4 +38,4 @@ def test_truth_can_be_entered_for_a_box_that_cannot_be_estimated(document, folde
     document.refresh()
     break_it(document)
     document.set_truths([0], 0.1, 2.0)
-    assert document.measurements[0].truth_m == (0.1, None, 2.0) and document.errors(0) is None
+    assert document.measurements[0].truth_m == (0.1, None, 2.0) and document.known_errors(0) is None

@@ -18,7 +18,7 @@ def test_a_missing_image_is_named_and_other_measurements_can_be_annotated(folder
     for read in (document.color, document.depth):
         with pytest.raises(SessionError, match='m1.png: missing'):
             read(1)
-    document.reject(1, 'no images')
+    document.reject([1], 'no images')
     document.set_truths([2], -0.5, 2.1)
     assert list(problems_of(document)) == []
 

@@ -85,5 +85,5 @@ def test_export_and_analysis(window_on, monkeypatch, tmp_path):
     driver.press((Qt.Key_A, CONTROL | SHIFT))
     driver.wait_for(lambda: opened)
     assert opened == [os.path.join(folder, 'analysis', 'report.html')] and os.path.exists(opened[0])
-    assert driver.window.results.analysed.model_note  # the bias is too steep
+    assert driver.window.results.analysis.model_note  # the bias is too steep
     assert 'no error_model.yaml is written' in driver.window.statusBar().currentMessage()

@@ -4,7 +4,8 @@ import stat
 
 import pytest
 
-from ros_3d_bb.core.atomic_file import atomic_write, locked_update
+from ros_3d_bb.core.atomic_file import atomic_write
+from ros_3d_bb.sessions.session_writer import locked_update
 
 
 def test_an_error_does_not_change_the_file(tmp_path):

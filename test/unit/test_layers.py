@@ -41,7 +41,7 @@ ALLOWED = {
         'genpy sensor_msgs std_msgs tf2_msgs tf2_ros yaml'),
     'ros_3d_bb.nodes.common': (
         'camera conversions core diagnosis msg pipeline planning visualization',
-        'diagnostic_msgs diagnostic_updater dynamic_reconfigure genpy rosgraph rosgraph_msgs rospkg rospy '
+        'diagnostic_msgs dynamic_reconfigure genpy rosgraph rosgraph_msgs rospkg rospy '
         'sensor_msgs std_msgs std_srvs tf2_ros'),
     'ros_3d_bb.nodes': (
         'bags camera conversions core detection detection.depth detection.yolov5 diagnosis drivers msg nodes.common '

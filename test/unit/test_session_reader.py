@@ -69,7 +69,7 @@ def test_rejected_measurements_are_skipped_even_if_invalid(folder):
     (lambda content: content['camera'].update(fx=0), 'intrinsics'),
     (lambda content: content['camera'].update(depth_scale=-0.001), 'depth_scale is -0.001'),
     (lambda content: content['camera'].update(width=float('inf')), 'infinity'),
-    (lambda content: content.update(frames=3), 'not iterable'),
+    (lambda content: content.update(frames=3), 'an object with frames expected'),
     (lambda content: content['frames'][0].pop('depth'), "'depth'"),
     (lambda content: content['frames'][0]['detections'][0].update(box=[1, 2, 3]), '[1, 2, 3]'),
     (lambda content: content['frames'].append(7), 'number 5')])

@@ -9,7 +9,6 @@ import pytest
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.core import atomic_file
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.sessions import session_writer
@@ -80,7 +79,7 @@ def test_a_measurement_is_removed_with_its_images_unless_it_is_annotated(folder)
     np.testing.assert_array_equal(read_color(session.frames[1], session.camera), measurement(2).color.pixels)
     with pytest.raises(ValueError, match='no longer'):
         remove(folder, ids[1])
-    with atomic_file.locked_update(folder) as content:
+    with session_writer.locked_update(folder) as content:
         content['frames'][1]['truth_mm'] = {'x': 0, 'z': 2000}
     with pytest.raises(ValueError, match='annotated'):
         remove(folder, ids[2])
@@ -127,7 +126,7 @@ def test_a_damaged_description_is_named_and_kept(folder, content):
 @pytest.mark.parametrize('full_at', ['color', 'depth', 'frames.json'])
 def test_a_full_disk_does_not_change_the_session(folder, monkeypatch, full_at):
     append(folder, measurement(0))
-    before, write_whole = content_of(folder), atomic_file.atomic_write
+    before, write_whole = content_of(folder), session_writer.atomic_write
 
     def failing(path, data):
         if full_at in os.path.relpath(path, folder):
@@ -135,7 +134,6 @@ def test_a_full_disk_does_not_change_the_session(folder, monkeypatch, full_at):
         write_whole(path, data)
 
     monkeypatch.setattr(session_writer, 'atomic_write', failing)
-    monkeypatch.setattr(atomic_file, 'atomic_write', failing)
     with pytest.raises(OSError):
         append(folder, measurement(1))
     assert content_of(folder) == before

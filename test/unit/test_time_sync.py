@@ -18,14 +18,14 @@ class Recorder(object):
         self.sync = StampSynchronizer(length_ns, tolerance_ns, assumed_delay_ns, self._on_frame, self._on_lost)
         self.frames, self.dropped = [], []
 
-    def _on_frame(self, *frame):
-        self.frames.append(frame)
+    def _on_frame(self, boxes, depth, camera):
+        self.frames.append((boxes.value, depth.value, camera))
 
     def _on_lost(self, boxes, before_jump):
         if before_jump:
-            self.dropped.append(boxes)
+            self.dropped.append(boxes.value)
         else:
-            self.frames.append((boxes, None, None))
+            self.frames.append((boxes.value, None, None))
 
     def add(self, kind, stamp_ns, now_ns, value):
         """Add a depth image, a camera or boxes. Returns the frames that this completed."""

@@ -147,10 +147,10 @@ def params(model, estimator):
 
 def test_an_error_model_is_rejected_for_another_estimator():
     stage = EstimationStage(params('d435i_thesis', 'foreground'), EventCounter())
-    sample = stage.sample
+    estimator = stage.estimator
     with pytest.raises(ValueError, match='is for the estimator foreground, not median'):
         stage.reconfigure(params('d435i_thesis', 'median'))
-    assert stage.sample is sample
+    assert stage.estimator is estimator
     with pytest.raises(ValueError, match='is for the estimator median, not foreground'):
         EstimationStage(params('thesis', 'foreground'), EventCounter())
 

@@ -16,6 +16,7 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.nodes.bbox3d_node import SampleImages
 from ros_3d_bb.nodes.common import master, startup, subscribers
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics, unsubscribed_results
+from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from support.ros import wait_until
 
 
@@ -64,7 +65,7 @@ def test_3d_boxes_do_not_wait_for_a_master_to_subscribe_colour():
             mock.patch('ros_3d_bb.nodes.bbox3d_node.patient_master', side_effect=OSError('no route')) as query:
         publisher.return_value.get_num_connections.return_value = 1
         diagnostics, depth = mock.MagicMock(), DepthImage(np.zeros((4, 4), np.uint16), 0.001)
-        images = SampleImages(10 ** 9, None, 6.0, diagnostics)
+        images = SampleImages(Bbox3dParams(), None, diagnostics)
         images.publish(Header(), depth, [])
         wait_until(lambda: diagnostics.warn.called, 'a warning')
         assert 'no route' in diagnostics.warn.call_args[0][1] and not subscriber.called
@@ -75,12 +76,15 @@ def test_3d_boxes_do_not_wait_for_a_master_to_subscribe_colour():
 
 def test_the_diagnostics_continue_after_a_failed_report():
     path = 'ros_3d_bb.nodes.common.diagnostics.'
-    with mock.patch(path + 'NodeUpdater') as updater, mock.patch('rospy.logwarn') as log, \
-            mock.patch(path + 'PERIOD_S', 0.01):
-        updater.return_value.force_update.side_effect = [ZeroDivisionError('by nothing')] + 1000 * [None]
+    with mock.patch('rospy.Publisher') as publisher, mock.patch('rospy.logwarn') as log, \
+            mock.patch('rospy.get_rostime', return_value=rospy.Time(1)), mock.patch(path + 'PERIOD_S', 0.01):
+        publish = publisher.return_value.publish
+        publish.side_effect = [ZeroDivisionError('by nothing')] + 1000 * [None]
         Diagnostics()
-        wait_until(lambda: updater.return_value.force_update.call_count >= 3, 'another report')
+        wait_until(lambda: publish.call_count >= 3, 'another report')
     assert 'by nothing' in log.call_args[0][1]
+    status, = publish.call_args[0][0].status
+    assert (status.name, status.message) == (rospy.get_name()[1:] + ': pipeline', 'no input yet')
 
 
 def test_an_input_subscribed_while_the_others_are_listed_is_kept():

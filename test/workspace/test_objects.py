@@ -3,9 +3,9 @@ import pytest
 
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.bags.process_bag import with_params
-from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, TRACKS_TOPIC, boxes3d_from_msg, tracks_from_msg
+from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, TRACKS_TOPIC, tracks_from_msg, usable_boxes3d
 from ros_3d_bb.core.event_counter import EventCounter
-from ros_3d_bb.pipeline.people_pipeline import CollectedResults, PeoplePipeline, Settings
+from ros_3d_bb.pipeline.people_pipeline import PeoplePipeline, Settings
 from ros_3d_bb_lab.evaluation.clear_mot import Moment, score
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_path
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import TRUTH_TOPIC, scenario_images
@@ -20,15 +20,14 @@ def run():
     """[(truth, 3D boxes, tracks)] of the images of config/scenarios/objects.yaml, as process_bag makes them."""
     settings = with_params(Settings(detector='none'), 'bbox3d', error_model=SIMULATED_ERROR_MODEL)
     transforms, images = BagTransforms(), []
-    outputs = CollectedResults(settings.tracker[1], EventCounter())
-    pipeline = PeoplePipeline(settings, EventCounter(), transforms, outputs)
+    pipeline = PeoplePipeline(settings, EventCounter(), transforms)
     for stamp_ns, messages in scenario_images(read_scenario(scenario_path('objects')), with_boxes=True):
         of_topic = dict(messages)
         transforms.add(of_topic['tf'])
         for topic, message in messages:
             if topic in settings.inputs and topic != 'tf':
                 pipeline.take(topic, message, stamp_ns)
-        results = dict(outputs.take())
+        results = dict(pipeline.take_results())
         images.append((of_topic[TRUTH_TOPIC], results[BOXES3D_TOPIC], results[TRACKS_TOPIC]))
     return images
 
@@ -50,7 +49,7 @@ def test_tracks_name_the_box_that_they_were_detected_as(run):
     detected = 0
     for _truth, boxes3d, tracks in run:
         assert boxes3d.header.stamp == tracks.header.stamp
-        boxes = boxes3d_from_msg(boxes3d)
+        boxes, _faults = usable_boxes3d(boxes3d)
         indices = [track.detection for track in tracks.objects if track.detection >= 0]
         assert len(set(indices)) == len(indices)
         for track in tracks.objects:

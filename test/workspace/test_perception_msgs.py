@@ -9,9 +9,9 @@ from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.conversions.camera_msgs import CameraFrame, messages_of
-from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, boxes2d_to_msg, boxes3d_from_msg,
-                                                   boxes3d_to_msg, camera_from_msg, stamp_of, time_from,
-                                                   tracks_from_msg, tracks_to_msg, usable_boxes3d, with_stamp)
+from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, boxes2d_to_msg, boxes3d_to_msg,
+                                                   camera_from_msg, stamp_of, time_from, tracks_from_msg,
+                                                   tracks_to_msg, usable_boxes3d, with_stamp)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject
@@ -148,8 +148,8 @@ def detection_of(box, roll_deg=0, pitch_deg=0, yaw_deg=0):
         quaternion = np.eye(4)[axis] * np.sin(angle / 2) + np.eye(4)[3] * np.cos(angle / 2)
         map_from_camera = map_from_camera.dot(transform_from((0, 0, 0), quaternion))
     map_from_camera = map_from_camera.dot(transform_from((0, 0, 0), OPTICAL_ROTATION))
-    boxes = boxes3d_from_msg(BoundingBox3DArray(boxes=[box]))
-    detection, = detections_from_boxes(dict(enumerate(boxes)), map_from_camera)
+    boxes, _faults = usable_boxes3d(BoundingBox3DArray(boxes=[box]))
+    detection, = detections_from_boxes(boxes, map_from_camera)
     return detection
 
 
@@ -158,7 +158,8 @@ def test_3d_boxes_survive(covariance_m2):
     sent = Box3D(np.array([0.1, 0.2, 3.0]), np.array([0.5, 1.7, 0.5]), (10, 20, 64, 48), 0.75,
                  (False, False, True, True), covariance_m2, 'dog', 0.625)
     camera = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
-    back, = boxes3d_from_msg(on_the_wire(boxes3d_to_msg([sent], header(1), camera)))
+    boxes, _faults = usable_boxes3d(on_the_wire(boxes3d_to_msg([sent], header(1), camera)))
+    back = boxes[0]
     for field, value in sent._asdict().items():
         np.testing.assert_array_equal(getattr(back, field), value)
 
@@ -194,7 +195,8 @@ def test_detections_are_upright_in_the_fixed_frame():
     np.testing.assert_allclose(detection.position_m, (3, -0.5, 0.9))
     np.testing.assert_allclose(detection.size_m, (0.6, 0.6, 1.8))
     np.testing.assert_allclose(detection.covariance_m2, np.diag([0.09, 0.01, 0.04]), atol=1e-12)
-    unknown = BoundingBox3D(truncated=True)  # no edge is trusted if the truncated edges are unknown
+    unknown = box_of()
+    unknown.truncated = True  # no edge is trusted if the truncated edges are unknown
     assert detection_of(unknown).truncated_edges == (True,) * 4
 
 

@@ -15,6 +15,7 @@ from ros_3d_bb.camera.camera_model import transform_from, transform_points
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.conversions.planner_msgs import (detections3d_to_msg, objects_to_msg, obstacles_to_msg,
                                                 people_to_msg)
+from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeParams
 from ros_3d_bb.planning.planner_outputs import outputs_from
@@ -160,7 +161,7 @@ def test_a_missing_package_is_named_with_what_to_install(monkeypatch, name, lack
 @pytest.mark.parametrize('outputs, said', [(['tebb'], "'tebb'; did you mean teb"), ([], 'outputs is empty')])
 def test_unknown_outputs_are_rejected_with_the_nearest_known_one(outputs, said):
     with pytest.raises(ValueError, match=said):
-        outputs_from(PlannerBridgeParams(outputs=outputs))
+        outputs_from(*params_from({'outputs': outputs}, PlannerBridgeParams))
 
 
 def test_the_costmap_needs_no_package_and_no_ring_where_its_range_is_zero():

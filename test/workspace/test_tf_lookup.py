@@ -95,7 +95,7 @@ def test_a_transform_of_the_future_does_not_stop_the_latest_pose():
                 connections.send('/tf', TFMessage(later))
             connections.send('/tf', TFMessage(links))
             if number < 10 or number >= 12:
-                assert transforms.latest('map', 'base_link')[0, 3] == number
+                assert transforms.latest('map', 'base_link')[0][0, 3] == number
 
 
 def test_one_late_transform_does_not_replace_the_latest_pose():

@@ -1,4 +1,1 @@
-"""Reading and writing bags, tf lookup in a bag, and the offline pipeline on a bag.
-
-May import: camera, conversions, core, pipeline, sessions.
-"""
+"""Reading and writing bags, tf lookup in a bag, and the offline pipeline on a bag."""

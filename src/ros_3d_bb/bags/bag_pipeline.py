@@ -11,18 +11,17 @@ from ros_3d_bb.bags.bag_reader import BagError, BagReader, Raw, message_in
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.bags.bag_writer import new_bag
 from ros_3d_bb.camera.image_rotation import mounted_camera, turns_for
-from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, IMAGE_KINDS, STATIC_TOPIC, TF_TOPIC,
-                                               absolute, info_of_images, uncompressed)
+from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, IMAGE_KINDS, RAW, STATIC_TOPIC, TF_TOPIC,
+                                               absolute, info_of_images)
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC
 from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.yolov5.backends import open_detector
 from ros_3d_bb.pipeline.camera_pose import FLOOR, POSE_FITTED, POSE_TEXT, CameraPoseStage
-from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.detection_stage import CameraRotation, detect_in_color
 from ros_3d_bb.pipeline.people_pipeline import (DEPTH_INFO_TOPIC, INFO_TOPIC, INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA,
-                                                CollectedResults, PeoplePipeline, Settings)
+                                                PeoplePipeline, Settings)
 
 MAX_WAITING_BYTES = 2 ** 28  # messages that are read ahead
 DRIVER_TF_NS = NS  # within this time from its start, a bag contains each frame of a camera driver
@@ -54,8 +53,7 @@ class BagRun(object):
         # As in the nodes, the detector has a buffer of its own, because it is ahead of the other stages.
         self._transforms, self._detector_transforms = BagTransforms(), BagTransforms()
         self._unread_tf = collections.deque()  # (time_ns, message) of tf that is not in the buffer yet
-        self._results = CollectedResults(settings.tracker[1], events)
-        self._pipeline = PeoplePipeline(settings, events, self._transforms, self._results)
+        self._pipeline = PeoplePipeline(settings, events, self._transforms)
         self._detector = None
         if settings.detector == 'yolov5':
             params, detection, running = settings.yolov5
@@ -75,9 +73,11 @@ class BagRun(object):
         self._read_depth_cameras()
         with ThreadPoolExecutor(self._settings.searches) as pool:
             for waiting in self._ahead(pool):
-                self._add_transforms(waiting.raw.time.to_nsec() + self._ahead_ns)
+                recorded_until_ns = waiting.raw.time.to_nsec() + self._ahead_ns
+                while self._unread_tf and self._unread_tf[0][0] <= recorded_until_ns:
+                    self._transforms.add(self._unread_tf.popleft()[1])
                 self._process(waiting)
-                yield waiting.raw, self._results.take()
+                yield waiting.raw, self._pipeline.take_results()
         self._pipeline.end()
 
     def _add_static(self, raw):
@@ -85,11 +85,6 @@ class BagRun(object):
             message = message_in(raw, TFMessage)
             self._transforms.add_static(message)
             self._detector_transforms.add_static(message)
-
-    def _add_transforms(self, until_ns):
-        """Add the transforms that were recorded until a time."""
-        while self._unread_tf and self._unread_tf[0][0] <= until_ns:
-            self._transforms.add(self._unread_tf.popleft()[1])
 
     def _set_camera_pose(self):
         """Set the pose of the camera, which tf does not contain.
@@ -124,7 +119,7 @@ class BagRun(object):
                 if raw.topic == info:
                     stage.add_camera_info(info_of_images(message_in(raw, *INPUTS[info_topic]), depth))
                 else:
-                    stage.add_depth(uncompressed(message_in(raw, *INPUTS[DEPTH_TOPIC])))
+                    stage.add_depth(message_in(raw, *INPUTS[DEPTH_TOPIC]))
             if stage.is_complete:
                 break
         if stage.pose is None:
@@ -172,7 +167,6 @@ class BagRun(object):
         return Waiting(raw)
 
     def _process(self, waiting):
-        """Process a message."""
         raw, image, search = waiting
         topic, camera = self._topics.get(raw.topic, UNUSED)
         if topic in (None, STATIC_TOPIC):
@@ -195,16 +189,18 @@ def process_bag(source, target, settings=Settings()):
     Raises BagError if the source cannot be read, ValueError if a parameter is invalid, and OSError if the target cannot
     be written; no target remains then.
     """
-    events = EventCounter()
+    events, made, types = EventCounter(), _outputs_of(settings), {}
     with BagReader(source) as reader, new_bag(target, settings.compression) as bag:
-        run, copy = BagRun(reader, settings, events), _copier(bag, settings)
-        known = set(reader.topics) | _outputs_of(settings)
+        run = BagRun(reader, settings, events)
         for topic in settings.keep or ():
-            if absolute(topic) not in known:
+            if absolute(topic) not in made.union(reader.topics):
                 events.note(NOT_KEPT, 'the bag has no topic /%s; did you mean %s?'
                             % (topic, nearest_name(topic, reader.topics)))
         for raw, outputs in run.outputs():
-            copy(raw)
+            if raw.topic not in made and (settings.keep is None or raw.topic.lstrip('/') in settings.keep):
+                if types.setdefault(raw.topic, raw.md5sum) != raw.md5sum:
+                    raise BagError('%s has messages of two types' % raw.topic)
+                _copy(raw, bag)
             for topic, message in outputs:
                 bag.write(settings.name(topic), message, raw.time)
     return events
@@ -218,17 +214,8 @@ def _outputs_of(settings):
     return made
 
 
-def _copier(bag, settings):
-    """Return a function that copies a Raw to a bag unchanged, except on topics that the pipeline writes."""
-    made, types = _outputs_of(settings), {}
-
-    def copy(raw):
-        if raw.topic in made or settings.keep is not None and raw.topic.lstrip('/') not in settings.keep:
-            return
-        if types.setdefault(raw.topic, raw.md5sum) != raw.md5sum:
-            raise BagError('%s has messages of two types' % raw.topic)
-        unused = type('Unused', (), {'_md5sum': raw.md5sum})  # rosbag requires a class, but uses the connection header
-        bag.write(raw.topic, (raw.datatype, raw.data, raw.md5sum, unused), raw.time, raw=True,
-                  connection_header=raw.connection_header)
-
-    return copy
+def _copy(raw, bag):
+    """Write a Raw to a bag unchanged."""
+    unused = type('Unused', (), {'_md5sum': raw.md5sum})  # rosbag requires a class, but uses the connection header
+    bag.write(raw.topic, (raw.datatype, raw.data, raw.md5sum, unused), raw.time, raw=True,
+              connection_header=raw.connection_header)

@@ -22,10 +22,6 @@ class BagTransforms(TransformBuffer):
         for transform in message.transforms:
             self.set_transform_static(transform, 'bag')
 
-    def frames_as_yaml(self):
-        """Return the current frames as YAML text in the format of tf2."""
-        return self.all_frames_as_yaml()
-
     def set_pose(self, target_frame, frame, target_from_frame):
         """Set the pose (4, 4) of a frame in a frame that tf does not contain, by a transform to the root of its tree.
 

@@ -42,12 +42,8 @@ def new_bag(path, compression):
             yield bag
         os.replace(partial, path)
     finally:
-        remove_partial(path)
-
-
-def remove_partial(path):
-    with contextlib.suppress(FileNotFoundError):
-        os.remove(path + PARTIAL)
+        with contextlib.suppress(FileNotFoundError):
+            os.remove(partial)
 
 
 def images_in(path, topics):

@@ -1,4 +1,1 @@
-"""Pinhole camera model, lens distortion, rigid transforms, depth images, and checks of depth-to-colour alignment.
-
-May import: core.
-"""
+"""Pinhole camera model, lens distortion, rigid transforms, depth images, and checks of depth-to-colour alignment."""

@@ -19,13 +19,8 @@ class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float
     """Intrinsics of a camera; image size, focal lengths and principal point in pixels.
 
     `distortion_model` and `distortion` are as in sensor_msgs/CameraInfo, see `distortion.MODELS`. They are normalised:
-    a camera without lens distortion has '' and ().
-
-    Raises
-    ------
-    ValueError
-        If the size is not positive, a focal length is not positive and finite, the principal point is not finite, or
-        `checked_distortion` rejects the distortion.
+    a camera without lens distortion has '' and (). Raises ValueError if the size is not positive, a focal length is not
+    positive and finite, the principal point is not finite, or `checked_distortion` rejects the distortion.
     """
 
     __slots__ = ()
@@ -80,8 +75,7 @@ class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float
 
 def transform_from(translation, quaternion):
     """Create a 4x4 matrix from a translation (x, y, z) in metres and a quaternion (x, y, z, w), which is normalised.
-
-    Raises ValueError if the quaternion cannot be normalised (zero, nan or inf).
+    Raises ValueError if it cannot be (zero, nan or inf).
     """
     quaternion = np.asarray(quaternion, float)
     norm = np.sqrt(quaternion.dot(quaternion))
@@ -118,8 +112,7 @@ def quarter_turns(up):
     """Number of clockwise quarter turns after which the image is upright; `up` (3,) is in the optical frame.
 
     0 for an upright camera, 1 if the left edge of the image is up, 2 if the camera is upside down, 3 if the right edge
-    is up. Also 0 for a camera that points up or down within `STEEP`, where people have no upright direction in the
-    image.
+    is up. Also 0 for a camera that points up or down within `STEEP`: people have no upright direction in its image.
     """
     x_up, y_up = up[:2]
     if np.hypot(x_up, y_up) < STEEP:

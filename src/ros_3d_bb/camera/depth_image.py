@@ -10,8 +10,7 @@ WIDEST_BORDER, BORDER_STEP = 0.05, 12  # of images without depth: share of the i
 class DepthImage(NamedTuple):
     """A depth image: raw `values` (height, width) of any numeric type; depth in metres is `values` times `scale_m`.
 
-    Depths that are zero, negative, nan, inf or greater than `FARTHEST_M` are invalid. `area_px` is its measured area
-    if that is known.
+    Depths that are zero, negative, nan, inf or more than `FARTHEST_M` are invalid. `area_px`: measured area, if known.
     """
 
     values: np.ndarray

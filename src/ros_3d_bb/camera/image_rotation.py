@@ -1,7 +1,7 @@
 """Rotation of images by quarter turns, for cameras that are mounted in portrait orientation or upside down.
 
-Convention: `turns` is the number of clockwise quarter turns after which an image is upright, 0..3. Edges of boxes are
-(x1, y1, x2, y2) in pixels, x2 and y2 exclusive.
+Convention: `turns` is the number of clockwise quarter turns after which an image is upright, 0..3; negative ones turn
+it back. Edges of boxes are (x1, y1, x2, y2) in pixels, x2 and y2 exclusive.
 """
 import functools
 
@@ -16,19 +16,8 @@ TURNED_FROM_CAMERA = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0
 
 
 def turns_for(image_rotation, up):
-    """Quarter turns that make the images of a camera upright.
-
-    Parameters
-    ----------
-    image_rotation : str
-        Clockwise rotation in degrees; `AUTO`: from `up`.
-    up : array_like, (3,) or None
-        Unit vector in the optical frame; None if unknown.
-
-    Returns
-    -------
-    int
-        0 for `AUTO` if `up` is unknown.
+    """Quarter turns that make the images of a camera upright: `image_rotation`, clockwise degrees as text, or for
+    `AUTO` those of the unit vector `up` (3,) in the optical frame, 0 if it is unknown (None).
     """
     if image_rotation != AUTO:
         return int(image_rotation) // 90
@@ -56,15 +45,8 @@ def turned_rotation(turns):
 def mounted_camera(height_m, tilt_rad, turns, roll_rad=0.0):
     """Pose (4, 4) of the optical frame of a camera that looks along x, above the origin of a frame whose z points up.
 
-    Parameters
-    ----------
-    height_m : float
-    tilt_rad : float
-        Pitch; positive: the camera looks down (REP 103).
-    turns : int
-        The camera is rolled so that this number of quarter turns makes its images upright.
-    roll_rad : float
-        Roll in addition to `turns`; positive: its right side is lower (REP 103).
+    Angles are as in REP 103: with a positive `tilt_rad`, its pitch, the camera looks down, and with a positive
+    `roll_rad` its right side is lower. It is also rolled so that `turns` quarter turns make its images upright.
     """
     pitched = transform_from((0, 0, height_m), (0, np.sin(tilt_rad / 2), 0, np.cos(tilt_rad / 2)))
     rolled = transform_from((0, 0, 0), (np.sin(roll_rad / 2), 0, 0, np.cos(roll_rad / 2)))
@@ -76,7 +58,7 @@ def mounted_camera(height_m, tilt_rad, turns, roll_rad=0.0):
 @functools.lru_cache(maxsize=16)
 def turned_camera(camera, turns):
     """The `camera_model.Camera` of the turned image, including its lens distortion."""
-    for _turn in range(turns):
+    for _turn in range(turns % 4):
         distortion = camera.distortion
         if distortion and camera.distortion_model != EQUIDISTANT:
             k1, k2, p1, p2 = distortion[:4]
@@ -87,16 +69,9 @@ def turned_camera(camera, turns):
 
 
 def turned_boxes(boxes, turns, width, height):
-    """Boxes (n, 4) of an image of `width` x `height` pixels, in the turned image. Inverse of `unturned_boxes`."""
-    for _turn in range(turns):
+    """Boxes (n, 4) of an image of `width` x `height` pixels, in the turned image."""
+    for _turn in range(turns % 4):
         x1, y1, x2, y2 = boxes.T
         boxes = np.stack((height - y2, x1, height - y1, x2), axis=1)
         width, height = height, width
     return boxes
-
-
-def unturned_boxes(boxes, turns, width, height):
-    """Boxes (n, 4) of a turned image, in the image of `width` x `height` pixels before it was turned."""
-    if turns % 2:
-        width, height = height, width
-    return turned_boxes(boxes, -turns % 4, width, height)

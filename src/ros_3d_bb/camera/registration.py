@@ -16,13 +16,8 @@ EDGE_PX = 2  # margin of the part of the depth image that is registered
 
 
 class Registration(object):
-    """Geometry of a colour and a depth camera, computed once for all of their images.
-
-    Parameters
-    ----------
-    color_camera, depth_camera : camera_model.Camera
-    color_from_depth : numpy.ndarray, (4, 4)
-        Transform between their optical frames.
+    """Geometry of a colour and a depth `camera_model.Camera`, computed once for all of their images. `color_from_depth`
+    (4, 4) transforms between their optical frames.
     """
 
     def __init__(self, color_camera, depth_camera, color_from_depth):
@@ -36,12 +31,8 @@ class Registration(object):
         self.area_px = self._area()
 
     def register(self, depth, rows, columns):
-        """Register a raw DepthImage to the pixels in rows and columns (slices) of the colour image.
-
-        Returns
-        -------
-        numpy.ndarray, (h, w)
-            Depth in metres; 0 where no depth was measured.
+        """Register a raw DepthImage to the pixels in rows and columns (slices) of the colour image. Returns the depth
+        (h, w) in metres; 0 where none was measured.
         """
         rows = range(*rows.indices(self.color_camera.height))
         columns = range(*columns.indices(self.color_camera.width))

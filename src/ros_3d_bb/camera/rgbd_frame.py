@@ -5,7 +5,7 @@ import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.image_rotation import (turned_boxes, turned_camera, turned_depth, turned_image, turned_rotation,
-                                             turns_for, unturned_boxes)
+                                             turns_for)
 
 
 class RgbdFrame(NamedTuple):
@@ -32,37 +32,29 @@ class RgbdFrame(NamedTuple):
     @property
     def received_camera(self):
         """The Camera of the received image."""
-        return turned_camera(self.camera, -self.turns % 4)
+        return turned_camera(self.camera, -self.turns)
 
     @property
     def received_depth(self):
         """The depth image with the pixels of the received colour image."""
-        return turned_depth(self.depth, -self.turns % 4)
+        return turned_depth(self.depth, -self.turns)
 
     @property
     def received_color(self):
         """The colour image as received."""
-        return turned_image(self.color, -self.turns % 4)
+        return turned_image(self.color, -self.turns)
 
     def upright_rects(self, rects_px):
         """Rectangles (n, 4) of the received image in the upright image. Inverse of `received_rects`."""
-        return turned_boxes(rects_px, self.turns, *self.received_camera[:2])
+        return turned_boxes(rects_px, self.turns, *self.received_camera[:2]) if self.turns else rects_px
 
     def received_rects(self, rects_px):
         """Rectangles (n, 4) of the upright image in the received image."""
-        return unturned_boxes(rects_px, self.turns, *self.received_camera[:2])
+        return turned_boxes(rects_px, -self.turns, *self.camera[:2])
 
 
 def upright_frame(frame, image_rotation):
-    """Turn a received RgbdFrame upright.
-
-    Parameters
-    ----------
-    frame : RgbdFrame
-        With `turns` 0.
-    image_rotation : str
-        As for `image_rotation.turns_for`.
-    """
+    """Turn a RgbdFrame, as received, upright; `image_rotation` is as for `image_rotation.turns_for`."""
     turns = turns_for(image_rotation, frame.up)
     if not turns:
         return frame

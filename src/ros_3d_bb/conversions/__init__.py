@@ -1,4 +1,1 @@
-"""Conversions between ROS messages and the types of this package, without rospy.
-
-May import: camera, core, estimation, msg, tracking.
-"""
+"""Conversions between ROS messages and the types of this package, without rospy."""

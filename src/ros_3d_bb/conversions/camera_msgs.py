@@ -18,11 +18,12 @@ from ros_3d_bb.core.time_sync import NS
 TF_TOPIC, STATIC_TOPIC = 'tf', 'tf_static'
 COLOR_TOPIC, DEPTH_TOPIC = 'camera/color/image_raw', 'camera/aligned_depth_to_color/image_raw'
 INFO_TOPICS = ('camera/color/camera_info', 'camera/aligned_depth_to_color/camera_info')
+RAW = 'raw'  # value of ~depth
 # Topics of the depth image and of its camera_info, by the parameter ~depth.
 DEPTH_TOPICS = {'aligned': (DEPTH_TOPIC, INFO_TOPICS[1]),
-                'raw': ('camera/depth/image_rect_raw', 'camera/depth/camera_info')}
+                RAW: ('camera/depth/image_rect_raw', 'camera/depth/camera_info')}
 # Topic of the images with the intrinsics of the colour camera_info, by ~depth; see `info_of_images`.
-COLOR_INFO_IMAGES = {'aligned': DEPTH_TOPIC, 'raw': COLOR_TOPIC}
+COLOR_INFO_IMAGES = {'aligned': DEPTH_TOPIC, RAW: COLOR_TOPIC}
 CAMERA = 'camera'  # namespace of the topics of a single camera
 TYPES = {TF_TOPIC: TFMessage, COLOR_TOPIC: Image, DEPTH_TOPIC: Image, INFO_TOPICS[0]: CameraInfo,
          INFO_TOPICS[1]: CameraInfo}

@@ -1,7 +1,6 @@
 """Decoding of sensor_msgs/CompressedImage: JPEG, PNG, and depth of the compressed_depth_image_transport (PNG or RVL).
 
-The declared size is checked before anything is decoded. OpenCV is imported only where it is used, see
-`camera.distortion`.
+The declared size is checked before anything is decoded. OpenCV is imported where it is used, see `camera.distortion`.
 """
 import struct
 

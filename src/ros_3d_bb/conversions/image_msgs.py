@@ -50,17 +50,25 @@ def array_from(message):
     return pixels[..., 0] if channels == 1 else pixels
 
 
-def pixels_from(message):
+def pixels_from(message, encodings=tuple(LAYOUTS), content='supported'):
     """Return the pixels, (height, width[, channels]), of an image message, which may be compressed, and their encoding.
 
-    Raises ValueError as `array_from`, or if a compressed image cannot be decoded.
+    Raises ValueError as `array_from`, if a compressed image cannot be decoded, or if the encoding is not one of
+    `encodings`, those of the expected `content`.
     """
     if not is_compressed(message):
+        if message.encoding not in encodings:
+            raise ValueError('%s image has encoding %r; expected one of %s'
+                             % (content, message.encoding, ', '.join(encodings)))
         return array_from(message), message.encoding
+    name = 'sensor_msgs/CompressedImage of format %.60r' % message.format
     try:
-        return decode(message.format, message.data)
+        pixels, encoding = decode(message.format, message.data)
     except ValueError as error:
-        raise ValueError('%s cannot be decoded: %s' % (_name_of(message), error))
+        raise ValueError('%s cannot be decoded: %s' % (name, error))
+    if encoding not in encodings:
+        raise ValueError('%s has encoding %.20r; a %s image expected' % (name, encoding, content))
+    return pixels, encoding
 
 
 def is_compressed(message):
@@ -68,32 +76,17 @@ def is_compressed(message):
     return hasattr(message, 'format')
 
 
-def _name_of(message):
-    return 'sensor_msgs/CompressedImage of format %.60r' % message.format
-
-
 def imgmsg_to_rgb(message):
     """Return the pixels of a colour image message as RGB, (height, width, 3), uint8; a view if the encoding allows it.
 
     Raises ValueError as `pixels_from`, and if the encoding is not colour or grey.
     """
-    pixels, encoding = _pixels_of('colour', message, COLOR_ENCODINGS)
+    pixels, encoding = pixels_from(message, COLOR_ENCODINGS, 'colour')
     if encoding in CONVERSIONS:
         return _converted(pixels, encoding)
     if pixels.ndim == 2:
         return np.repeat(pixels[..., None], 3, axis=2)
     return pixels[..., 2::-1] if encoding in ('bgr8', 'bgra8', '8UC3') else pixels[..., :3]
-
-
-def _pixels_of(content, message, encodings):
-    """As `pixels_from`; raises ValueError if the encoding is not one of `encodings`."""
-    if not is_compressed(message) and message.encoding not in encodings:
-        raise ValueError('%s image has encoding %r; expected one of %s'
-                         % (content, message.encoding, ', '.join(encodings)))
-    pixels, encoding = pixels_from(message)
-    if encoding not in encodings:
-        raise ValueError('%s has encoding %.20r; a %s image expected' % (_name_of(message), encoding, content))
-    return pixels, encoding
 
 
 def _converted(pixels, encoding):
@@ -114,7 +107,7 @@ def imgmsg_to_depth(message, scale_m=None, check_unit=False):
     Raises ValueError as `pixels_from`, if the encoding is not a depth encoding, and with `check_unit` as `units_fault`.
     `scale_m` is given in metres per unit, for a camera that does not follow REP 118.
     """
-    pixels, encoding = _pixels_of('depth', message, tuple(DEPTH_SCALES))
+    pixels, encoding = pixels_from(message, tuple(DEPTH_SCALES), 'depth')
     depth = DepthImage(pixels, scale_m or DEPTH_SCALES[encoding])
     fault = units_fault(depth) if check_unit else ''
     if fault:

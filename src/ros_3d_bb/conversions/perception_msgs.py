@@ -100,10 +100,7 @@ def boxes2d_to_msg(boxes, header, labels=None, scores=None, image_size=None):
 
 
 def detections2d_to_msg(detections, names, header, image_size):
-    """Convert `detection.boxes.Detections` to std_msgs/Int32MultiArray as `boxes2d_to_msg`.
-
-    `names` are the class names by number.
-    """
+    """Convert `detection.boxes.Detections` as `boxes2d_to_msg`; `names` are the class names by number."""
     return boxes2d_to_msg(detections.boxes, header, [names[number] for number in detections.classes],
                           detections.scores, image_size)
 
@@ -111,27 +108,25 @@ def detections2d_to_msg(detections, names, header, image_size):
 def boxes2d_from_msg(message):
     """Convert an Int32MultiArray, with or without stamp, classes and scores in its layout, to Boxes2D.
 
-    Without classes, the boxes are those of people; without scores, their scores are unknown.
-
-    Raises
-    ------
-    ValueError
-        If the length is not a multiple of 4, there are too many boxes, or the label is malformed: the stamp is not a
-        number, there is not one class or one score for each box, or one of them is invalid.
+    Without classes, the boxes are those of people; without scores, their scores are unknown. Raises ValueError if the
+    length is not a multiple of 4, there are too many boxes, or the label is malformed: the stamp is not a number, there
+    is not one class or one score for each box, or one of them is invalid.
     """
     if len(message.data) % 4:
         raise ValueError('2D boxes have %d numbers; a multiple of 4 expected (x1 y1 x2 y2 each)' % len(message.data))
     if len(message.data) > 4 * MAX_BOXES:
         raise ValueError('%d 2D boxes in one image; at most %d expected' % (len(message.data) // 4, MAX_BOXES))
     boxes = np.array(message.data, np.int64).reshape(-1, 4)
-    label = _layout_label(message)
+    dimensions = message.layout.dim
+    label = dimensions[0].label if dimensions else ''
+    size = IMAGE_SIZE.search(dimensions[1].label) if len(dimensions) > 1 else None
+    image_size = size and (int(size.group(1)), int(size.group(2)))
     classes_and_scores = CLASSES.search(label)
     labels, scores = _labels_and_scores(*classes_and_scores.groups(), len(boxes))
     fields = {}
     for field in label[:classes_and_scores.start()].split(';', 2):
         name, _equals, value = field.partition('=')
         fields[name] = value
-    image_size = _image_size(message)
     if 'stamp' not in fields:
         return Boxes2D(boxes, None, '', labels, scores, image_size)
     secs, _dot, nsecs = fields['stamp'].partition('.')
@@ -141,38 +136,25 @@ def boxes2d_from_msg(message):
     return Boxes2D(boxes, int(secs) * NS + int(nsecs), fields.get('frame', ''), labels, scores, image_size)
 
 
-def _layout_label(message):
-    return message.layout.dim[0].label if message.layout.dim else ''
-
-
-def _image_size(message):
-    """The (width, height) in the label of the second dimension, None without."""
-    found = IMAGE_SIZE.search(message.layout.dim[1].label) if len(message.layout.dim) > 1 else None
-    return found and (int(found.group(1)), int(found.group(2)))
-
-
 def _labels_and_scores(classes, scores, count):
     """Class names and scores of `count` boxes from the texts in a label, which are None if they are missing."""
     labels, numbers = (PERSON,) * count, np.zeros(count)
+    for name, text in (('classes', classes), ('scores', scores)):
+        if text and text.count(',') + 1 != count:
+            raise ValueError('2D boxes have %d %s for %d boxes; one for each box expected'
+                             % (text.count(',') + 1, name, count))
     if classes:
-        labels = tuple(_entries(classes, count, 'classes'))
+        labels = tuple(classes.split(','))
         for fault in filter(None, map(label_fault, set(labels))):
             raise ValueError('2D boxes have %s' % fault)
     if scores:
         try:
-            numbers = np.array(list(map(float, _entries(scores, count, 'scores'))))
+            numbers = np.array(list(map(float, scores.split(','))))
         except ValueError as error:
             raise ValueError('2D boxes have unusable scores: %s' % error)
         for fault in filter(None, map(score_fault, numbers)):
             raise ValueError('2D boxes have %s' % fault)
     return labels, numbers
-
-
-def _entries(text, count, name):
-    entries = text.split(',')
-    if len(entries) != count:
-        raise ValueError('2D boxes have %d %s for %d boxes; one for each box expected' % (len(entries), name, count))
-    return entries
 
 
 def with_stamp(message, stamp):
@@ -182,10 +164,8 @@ def with_stamp(message, stamp):
     """
     if hasattr(message, 'layout'):
         boxes = boxes2d_from_msg(message)
-        stamped = boxes2d_to_msg(boxes.boxes, Header(stamp=stamp, frame_id=boxes.frame_id))
-        stamped.layout.dim[0].label += CLASSES.search(_layout_label(message)).group()
-        stamped.layout.dim[1:] = message.layout.dim[1:]
-        return stamped
+        return boxes2d_to_msg(boxes.boxes, Header(stamp=stamp, frame_id=boxes.frame_id), boxes.labels, boxes.scores,
+                              boxes.image_size)
     for part in getattr(message, 'transforms', [message]):
         part.header.stamp = stamp
     return message
@@ -226,7 +206,7 @@ def header_of(frame):
 
 
 def boxes3d_to_msg(boxes, header, camera):
-    """Convert 3D boxes (`box3d.Box3D`) to BoundingBox3DArray. Inverse of `boxes3d_from_msg`."""
+    """Convert 3D boxes (`box3d.Box3D`) to BoundingBox3DArray. Inverse of `usable_boxes3d`."""
     array = BoundingBox3DArray(header=header)
     for box in boxes:
         score, support = np.float32([box.score, box.support]).tolist()  # as received, so that process_bag does the same
@@ -246,11 +226,6 @@ def boxes3d_to_msg(boxes, header, camera):
     return array
 
 
-def boxes3d_from_msg(message):
-    """Convert a BoundingBox3DArray to a tuple of `box3d.Box3D`. Inverse of `boxes3d_to_msg`."""
-    return tuple(map(_box3d_from_msg, message.boxes))
-
-
 def _box3d_from_msg(box):
     covariance_m2 = np.reshape(box.position_covariance, (3, 3)) if any(box.position_covariance) else None
     roi = box.roi
@@ -263,7 +238,7 @@ def _box3d_from_msg(box):
 
 
 def usable_boxes3d(message):
-    """Convert the 3D boxes of a BoundingBox3DArray that can be tracked.
+    """Convert the 3D boxes of a BoundingBox3DArray that can be tracked. Inverse of `boxes3d_to_msg`.
 
     Returns {index in the message: `box3d.Box3D`}, and a sentence about the fault of each other box. Raises
     ValueError if there are too many boxes.

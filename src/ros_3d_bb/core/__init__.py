@@ -1,4 +1,1 @@
-"""Helpers shared by all folders: parameters, YAML, time synchronization, counters, a worker thread, atomic files.
-
-May import: nothing of this package.
-"""
+"""Helpers shared by all folders: parameters, YAML, time synchronization, counters, a worker thread, atomic files."""

@@ -19,10 +19,6 @@ class _Clock(NamedTuple):
         """Whether the stamps of two cameras, relative to their arrival times, differ by at most `limit_ns`."""
         return abs(self.stamp_ns - self.arrival_ns - other.stamp_ns + other.arrival_ns) <= limit_ns
 
-    def leaps_to(self, later):
-        """Whether the stamp of the next image jumps back, or forward by more than the elapsed time."""
-        return not -JUMP_NS <= later.stamp_ns - self.stamp_ns <= later.arrival_ns - self.arrival_ns + JUMP_NS
-
 
 class CameraClocks(object):
     """Decides between cameras whose stamps differ by more than `JUMP_NS`.
@@ -69,8 +65,10 @@ class CameraClocks(object):
     def _continued(self, clock, camera, alive):
         """The clock with `since_ns` from the camera's previous image, or from the other cameras with the same time."""
         former = self._clocks.get(camera)
-        if former is not None and former.since_ns != NEVER and not former.leaps_to(clock):
-            return clock._replace(since_ns=former.since_ns)
+        if former is not None and former.since_ns != NEVER:
+            passed_ns, advance_ns = clock.arrival_ns - former.arrival_ns, clock.stamp_ns - former.stamp_ns
+            if -JUMP_NS <= advance_ns <= passed_ns + JUMP_NS:  # the stamp jumps neither back nor ahead of the arrivals
+                return clock._replace(since_ns=former.since_ns)
         limit_ns = LONGEST_LAG_NS if former is None else JUMP_NS
         return clock._replace(since_ns=min((other.since_ns for name, other in alive.items()
                                             if name != camera and clock.is_near(other, limit_ns)), default=NEVER))

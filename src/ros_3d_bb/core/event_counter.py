@@ -7,10 +7,7 @@ MOST_LAGS = 10000  # maximum number of stored latencies
 
 
 class EventCounter(object):
-    """Counts events, and keeps the first message about each.
-
-    `clock` returns ROS time (genpy.Time), for `record_latency`.
-    """
+    """Counts events, and keeps the first message about each. `clock` returns ROS time, for `record_latency`."""
 
     def __init__(self, clock=None):
         self._lock = threading.Lock()  # a topic with two publishers has two threads

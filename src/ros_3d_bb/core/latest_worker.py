@@ -4,8 +4,7 @@ import threading
 
 
 class NewestWorker(object):
-    """Calls `work(item)` in a separate thread with the newest items offered, in order. At most `most` wait; older ones
-    are dropped.
+    """Calls `work(item)` in a separate thread with the newest items offered, in order. At most `most` items wait.
 
     An exception of `work` is passed to `on_error`, and the thread continues with the next item.
     """

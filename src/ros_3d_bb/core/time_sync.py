@@ -96,7 +96,6 @@ class MessageCache(object):
         return min(in_time, key=lambda entry: abs(entry.arrival_ns - arrival_ns), default=None)
 
     def clear(self):
-        """Delete all entries."""
         self._entries.clear()
         self.newest_ns = None
 
@@ -107,23 +106,13 @@ class StampSynchronizer(object):
     Boxes usually arrive after their depth image, by the latency of the detector. Boxes that arrive first wait for the
     depth image and the camera_info. If that camera_info is lost, the one nearest in time is used as soon as a newer
     message shows the loss. Boxes without a stamp are matched by arrival time, to the depth image that arrived nearest
-    to `assumed_delay_ns` before them. A camera_info without a stamp is used for all images, because intrinsics do not
-    change with time.
+    to `assumed_delay_ns`, an attribute, before them. A camera_info without a stamp is used for all images, because
+    intrinsics do not change with time.
 
-    All boxes are passed to exactly one of the two callbacks, in the order of arrival, by the methods `add_` and `end`.
-
-    Parameters
-    ----------
-    length_ns : int
-        How long images are kept, and how long boxes wait.
-    tolerance_ns : int
-        Largest difference between the stamps of one frame, see `MessageCache.matching`.
-    assumed_delay_ns : int
-        Latency of the detector, for boxes without a stamp; also an attribute.
-    on_frame : callable
-        Called with boxes, depth and camera of one stamp.
-    on_lost : callable
-        Called with unmatched boxes, and whether they are lost because time jumped back.
+    Images are kept, and boxes wait, for `length_ns`. The stamps of one frame differ by at most `tolerance_ns`, see
+    `MessageCache.matching`. All boxes are passed to exactly one of two callbacks, in the order of arrival, by the
+    methods `add_` and `end`: `on_frame` with boxes and depth, both Stamped, and camera of one frame, or `on_lost` with
+    unmatched boxes, Stamped, and whether they are lost because time jumped back.
     """
 
     def __init__(self, length_ns, tolerance_ns, assumed_delay_ns, on_frame, on_lost):
@@ -160,7 +149,7 @@ class StampSynchronizer(object):
             if (self._cameras.newest_ns or 0) > stamp_ns + self._length_ns:  # no camera_info of the new time yet
                 self._cameras.clear()
             self._end_before_ns = newest_ns
-            self._lose_waiting(True)
+            self.end(before_jump=True)
         self._match_waiting(now_ns)
 
     def add_camera(self, stamp_ns, now_ns, camera):
@@ -178,41 +167,37 @@ class StampSynchronizer(object):
         if stamp_ns is None:
             depth = self._depths.arrived_at(now_ns - self.assumed_delay_ns, self._length_ns)
             stamp_ns = None if depth is None else depth.stamp_ns
-        newest_ns = self._depths.newest_ns
+        entry, newest_ns = Stamped(stamp_ns, now_ns, boxes), self._depths.newest_ns
         if stamp_ns is None:
             self._match_waiting(now_ns)
-            self._on_lost(boxes, False)
+            self._on_lost(entry, False)
         elif newest_ns is not None and newest_ns + self._length_ns < stamp_ns <= self._end_before_ns:
-            self._on_lost(boxes, True)  # boxes from before the time jump
+            self._on_lost(entry, True)  # boxes from before the time jump
             self._match_waiting(now_ns)
         else:
-            self._waiting.append(Stamped(stamp_ns, now_ns, boxes))
+            self._waiting.append(entry)
             self._match_waiting(now_ns)
 
-    def end(self):
-        """Signal the end of the input: all waiting boxes are lost."""
-        self._lose_waiting(False)
-
-    def _lose_waiting(self, before_jump):
+    def end(self, before_jump=False):
+        """Give up all waiting boxes, at the end of the input or before a time jump."""
         lost, self._waiting = self._waiting, []
         for entry in lost:
-            self._on_lost(entry.value, before_jump)
+            self._on_lost(entry, before_jump)
 
     def _match_waiting(self, now_ns):
         """Call the callbacks for boxes whose frame is complete, is lost, or did not arrive in time."""
         if not self._waiting:
             return
-        settled, waiting = [], []
-        newest_ns = self._depths.newest_ns
-        is_tolerance_known = self._tolerance_ns > 0 or len(self._depths) > 1
+        settled, waiting, newest_ns = [], [], self._depths.newest_ns
         for number, entry in enumerate(self._waiting):
             depth = self._depths.matching(entry.stamp_ns, self._tolerance_ns)
             camera = None if depth is None else self._camera_at(entry.stamp_ns)
-            is_lost = depth is None and newest_ns is not None and entry.stamp_ns < newest_ns and is_tolerance_known
+            is_lost = depth is None and newest_ns is not None and entry.stamp_ns < newest_ns and (
+                self._tolerance_ns > 0 or len(self._depths) > 1)  # else the tolerance is unknown
             is_late = now_ns - entry.arrival_ns > self._length_ns
             is_crowded = len(self._waiting) - number > MAX_WAITING
             if camera is not None or is_lost or is_late or is_crowded:
-                settled.append((entry.value, depth, camera))
+                settled.append((entry, depth, camera))
             else:
                 waiting.append(entry)
         self._waiting = waiting
@@ -220,7 +205,7 @@ class StampSynchronizer(object):
             if camera is None:
                 self._on_lost(boxes, False)
             else:
-                self._on_frame(boxes, depth.value, camera)
+                self._on_frame(boxes, depth, camera)
 
     def _camera_at(self, stamp_ns):
         """The camera of the boxes, or the nearest one as soon as a newer message shows that its own is lost."""

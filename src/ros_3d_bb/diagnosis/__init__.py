@@ -1,4 +1,1 @@
-"""Diagnosis of a running graph or a bag: observations, checks, and findings with suggested fixes.
-
-May import: bags, camera, conversions, core, detection.depth, msg.
-"""
+"""Diagnosis of a running graph or a bag: observations, checks, and findings with suggested fixes."""

@@ -13,10 +13,7 @@ MIN_PEOPLE, TIMES_MORE = 4, 3  # that are found in rotated images, at least, and
 
 
 class CameraMount(NamedTuple):
-    """Mount of a camera.
-
-    `pose` is None if no floor is visible, `people` is their number in the images for each number of quarter turns.
-    """
+    """Mount of a camera: number of people in the images by quarter turns, and pose; None if no floor is visible."""
 
     images: int
     people: dict
@@ -25,14 +22,7 @@ class CameraMount(NamedTuple):
 
 
 def camera_mount(pairs, camera):
-    """Return the CameraMount of a camera.
-
-    Parameters
-    ----------
-    pairs : sequence of (ndarray, DepthImage)
-        RGB images (h, w, 3) and aligned depth of the same time.
-    camera : camera_model.Camera
-    """
+    """Return the CameraMount of a Camera, from pairs of an RGB image (h, w, 3) and aligned DepthImage of one time."""
     chosen = [pairs[number] for number in np.unique(np.linspace(0, len(pairs) - 1, IMAGES).astype(int))]
     people = {0: _people_in(chosen, camera, 0)}
     if people[0] < FEW * len(chosen):

@@ -132,30 +132,7 @@ def _encodings(seen):
 def _stamps(seen):
     """Check for missing stamps and stamps far from the current time; only the first fault is reported."""
     for key in IMAGES:
-        stream = seen.streams[key]
-        if not stream.count:
-            continue
-        if not stream.stamps_ns and key == INFO:
-            continue  # it is used without
-        if not stream.stamps_ns:
-            yield Finding('stamps', '', 'the messages on %s have no stamp (zero)' % stream.topic,
-                          UNSTAMPED_FIX)
-            return
-        repeated = sum(one == other for one, other in zip(stream.stamps_ns, stream.stamps_ns[1:]))
-        if repeated > MAX_REPEATED * len(stream.stamps_ns):
-            yield Finding('stamps', '', '%d of %d messages on %s have the stamp of the one before'
-                          % (repeated, len(stream.stamps_ns), stream.topic), UNSTAMPED_FIX)
-            return
-        missing = min(stream.count, KEPT) - len(stream.stamps_ns)
-        if missing:
-            yield Finding('stamps', '', '%d of %d messages on %s have no stamp (zero) and are rejected'
-                          % (missing, missing + len(stream.stamps_ns), stream.topic), UNSTAMPED_FIX)
-            return
-        if max(stream.stamps_ns) >= LATEST_NS:
-            yield Finding('stamps', '', 'the messages on %s have stamps of the year 2038 or later, which are rejected'
-                          % stream.topic, 'correct the clock of their publisher')
-            return
-        fault, fix = _stamp_fault(seen, stream)
+        fault, fix = _stamp_fault(seen, key)
         if fault:
             yield Finding('stamps', '', fault, fix)
             return
@@ -163,16 +140,33 @@ def _stamps(seen):
         yield Finding('stamps', 'depth images arrive %s after their stamp' % span(max(0.0, seen.streams[DEPTH].lag_s)))
 
 
-def _stamp_fault(seen, stream):
-    if seen.is_bag:
-        if abs(stream.lag_s) <= LATE_S:
-            return '', ''
-        return ('the stamps on %s are %s from the time of their recording' % (stream.topic, span(abs(stream.lag_s))),
-                'to record a bag while another one is played, set use_sim_time and play with --clock; process_bag '
-                'accepts this bag as it is')
+def _stamp_fault(seen, key):
+    stream = seen.streams[key]
+    stamps_ns, topic = stream.stamps_ns, stream.topic
+    if not stream.count or (not stamps_ns and key == INFO):  # camera_info is used without a stamp
+        return '', ''
+    if not stamps_ns:
+        return 'the messages on %s have no stamp (zero)' % topic, UNSTAMPED_FIX
+    repeated = sum(one == other for one, other in zip(stamps_ns, stamps_ns[1:]))
+    if repeated > MAX_REPEATED * len(stamps_ns):
+        return ('%d of %d messages on %s have the stamp of the one before' % (repeated, len(stamps_ns), topic),
+                UNSTAMPED_FIX)
+    missing = min(stream.count, KEPT) - len(stamps_ns)
+    if missing:
+        return ('%d of %d messages on %s have no stamp (zero) and are rejected'
+                % (missing, missing + len(stamps_ns), topic), UNSTAMPED_FIX)
+    if max(stamps_ns) >= LATEST_NS:
+        return ('the messages on %s have stamps of the year 2038 or later, which are rejected' % topic,
+                'correct the clock of their publisher')
     if seen.use_sim_time and not seen.clock_count:
         return '', ''  # reported by _clock
-    return clock_fault(stream, seen.use_sim_time)
+    if not seen.is_bag:
+        return clock_fault(stream, seen.use_sim_time)
+    if abs(stream.lag_s) <= LATE_S:
+        return '', ''
+    return ('the stamps on %s are %s from the time of their recording' % (topic, span(abs(stream.lag_s))),
+            'to record a bag while another one is played, set use_sim_time and play with --clock; process_bag accepts '
+            'this bag as it is')
 
 
 def _pairs_of_images(seen):

@@ -11,7 +11,7 @@ from tf2_msgs.msg import TFMessage
 from ros_3d_bb.bags.bag_reader import BagReader, message_in
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.camera.alignment import EdgeComparison, frames_fault, size_fault
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, IMAGE_KINDS, STATIC_TOPIC, TF_TOPIC, uncompressed
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, IMAGE_KINDS, RAW, STATIC_TOPIC, TF_TOPIC, uncompressed
 from ros_3d_bb.conversions.image_msgs import DEPTH_SCALES, imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, camera_from_msg, time_from
 from ros_3d_bb.core.time_sync import NS, SAME_NS
@@ -19,7 +19,6 @@ from ros_3d_bb.diagnosis.camera_mount import camera_mount
 from ros_3d_bb.diagnosis.checks import COLOR, DEPTH, INFO, ROLES
 from ros_3d_bb.diagnosis.observations import COMPRESSED_IMAGE, IMAGE, KEPT, Newest, Observations, Stream, TfSeen
 from ros_3d_bb.diagnosis.tf_tree import links_in
-from ros_3d_bb.pipeline.depth_registration import RAW
 
 COMPARED_NS, PAIRS = NS // 4, 16  # between two images that are kept and compared; number of those that are kept
 BAG_SECONDS = 10.0  # cache length of tf2
@@ -82,15 +81,14 @@ class Observation(object):
         self.on_message()
 
     def stream(self, published_kind, publishers=()):
-        """Return the observations as a Stream."""
         passed_s = (self._last_ns - self._first_ns) / NS if self._count > 1 else 0.0  # negative after a jump in time
         return Stream(self.role, self.topic, published_kind, publishers, self._count,
                       (self._count - 1) / passed_s if passed_s > 0 else 0.0, tuple(self._stamps_ns), *self._lags_s)
 
-    def tf_seen(self, lookup, frames_as_yaml, target_frame, source_frame=''):
+    def tf_seen(self, transforms, target_frame, source_frame=''):
         """Look up the pose of the camera in the fixed frame at the stamp of an image. None without images.
 
-        `lookup` and `frames_as_yaml` are methods of a tf2 buffer; `source_frame` replaces the frame_id of the image.
+        `transforms` is a TransformBuffer; `source_frame` replaces the frame_id of the image.
         """
         if not self._stamps_ns:
             return None
@@ -98,19 +96,22 @@ class Observation(object):
         target, source = target_frame.lstrip('/'), (source_frame or self.newest.header.frame_id).lstrip('/')
         stamp, fault = time_from(stamp_ns), ''
         try:
-            lookup(target, source, stamp)
+            transforms.lookup(target, source, stamp)
         except tf2_ros.TransformException as error:
             fault = str(error)
-        return TfSeen(target, source, stamp.to_sec(), links_in(frames_as_yaml()), fault)
+        return TfSeen(target, source, stamp.to_sec(), links_in(transforms.all_frames_as_yaml()), fault)
 
 
-def observations_of(observed, depth_info, topics, seconds, publishers_of=lambda _observation: (), **others):
+def observations_of(observed, depth_info, topics, seconds, publishers_of=lambda _topic: (), **others):
     """Return the Observations of recorded messages; `topics`, `seconds` and `others` are fields of it.
 
     `observed` has an Observation for each role, `depth_info` is that of the camera_info of depth, and `publishers_of`
-    returns the publishers of an Observation.
+    returns the publishers of a topic; it is called for silent ones.
     """
-    streams = {key: one.stream(topics.get(one.topic, ''), publishers_of(one)) for key, one in observed.items()}
+    streams = {}
+    for key, one in observed.items():
+        publishers = publishers_of(one.topic) if one.newest is None and one.topic in topics else ()
+        streams[key] = one.stream(topics.get(one.topic, ''), publishers)
     return Observations(streams, topics, seconds,
                         color_info=_newest(observed[INFO].newest, camera_from_msg),
                         depth_info=_newest(depth_info.newest, camera_from_msg),
@@ -122,8 +123,7 @@ def observations_of(observed, depth_info, topics, seconds, publishers_of=lambda 
 def observe_bag(path, name_of, target_frame, depth='aligned'):
     """Return the Observations of the first BAG_SECONDS of a bag. Raises BagError if it cannot be read.
 
-    `name_of` maps the name of a topic of the nodes to its name in the bag, with a leading slash; `depth` is a parameter
-    of bbox3d_node.
+    `name_of` maps topics of the nodes to their names in the bag, with a leading slash; `depth` is as for bbox3d_node.
     """
     depth_topic, info_topic = DEPTH_TOPICS[depth]
     roles = dict(ROLES, **{DEPTH: ROLES[DEPTH]._replace(name=depth_topic)})
@@ -137,9 +137,8 @@ def observe_bag(path, name_of, target_frame, depth='aligned'):
     info = observed[INFO].newest
     frame_id = info.header.frame_id if depth == RAW and info is not None else ''  # that of the 3D boxes
     seen = observations_of(observed, depth_info, topics, BAG_SECONDS, is_bag=True, edges_fault=edges.fault(),
-                           tf=observed[DEPTH].tf_seen(transforms.lookup, transforms.frames_as_yaml, target_frame,
-                                                      frame_id), depth_is_raw=depth == RAW, raw_topics=raw_topics,
-                           depth_info_topic=depth_info.topic)
+                           tf=observed[DEPTH].tf_seen(transforms, target_frame, frame_id), depth_is_raw=depth == RAW,
+                           raw_topics=raw_topics, depth_info_topic=depth_info.topic)
     if depth == RAW:
         return seen
     is_aligned = seen.color_info is not None and seen.depth is not None and not (

@@ -1,11 +1,10 @@
 """The next command on the way from a bag to its tracks, and to a picture of them."""
 from shlex import quote
 
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, DEPTH_TOPICS, info_topic_beside
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, DEPTH_TOPICS, RAW, info_topic_beside
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.diagnosis.checks import COLOR, DEPTH, IMAGES, TRACKS
 from ros_3d_bb.diagnosis.topic_faults import other_topic
-from ros_3d_bb.pipeline.depth_registration import RAW
 
 MIN_ROLL_RAD = 0.02  # smaller ones are within the error of the fitted floor
 
@@ -30,17 +29,15 @@ def next_command(bag, seen, found):
         return report % quote(bag), 'draws the tracks'
     faults = set(finding.subject for finding in found if finding.fault)
     raw = _raw_topic(seen, 'alignment' in faults)
+    purpose = 'checks the topics that probably are the missing ones' if missing else ''
     if not option and raw and ('alignment' in faults or others.get(DEPTH_TOPIC) == ''):
-        names, option = {name: topic for name, topic in names.items() if name != DEPTH_TOPIC}, ' --depth raw'
-        others = dict({name: topic for name, topic in others.items() if name != DEPTH_TOPIC}, **{
-            name: topic for name, topic in zip(DEPTH_TOPICS[RAW], (raw, info_topic_beside(raw)))
-            if topic.lstrip('/') != name})
-        if all(others.values()):
-            return ('rosrun ros_3d_bb doctor %s%s%s' % (quote(bag), option, _remappings(dict(names, **others))),
-                    'checks the raw depth, which process_bag registers to colour')
-    if missing and all(others.values()):
-        return ('rosrun ros_3d_bb doctor %s%s%s' % (quote(bag), option, _remappings(dict(names, **others))),
-                'checks the topics that probably are the missing ones')
+        option, purpose = ' --depth raw', 'checks the raw depth, which process_bag registers to colour'
+        for topics in (names, others):
+            topics.pop(DEPTH_TOPIC, None)
+        raw_topics = zip(DEPTH_TOPICS[RAW], (raw, info_topic_beside(raw)))
+        others.update((name, topic) for name, topic in raw_topics if topic.lstrip('/') != name)
+    if purpose and all(others.values()):
+        return 'rosrun ros_3d_bb doctor %s%s%s' % (quote(bag), option, _remappings(dict(names, **others))), purpose
     if missing or faults - {'transforms', 'image rotation'}:
         return '', ''
     pose, hint = _pose(seen.mount) if faults else ('', '')

@@ -1,4 +1,1 @@
-"""Cameras read without a ROS driver.
-
-May import: camera, core.
-"""
+"""Cameras read without a ROS driver."""

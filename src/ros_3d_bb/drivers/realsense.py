@@ -1,7 +1,4 @@
-"""Driver of RealSense cameras and of their recordings, based on librealsense's Python package `pyrealsense2`.
-
-The package is optional: it is imported when a camera is opened.
-"""
+"""Driver of RealSense cameras and their recordings, with `pyrealsense2`, which is imported when a camera is opened."""
 import os
 import time
 from typing import NamedTuple
@@ -41,14 +38,6 @@ class RealSenseParams(NamedTuple):
     real_time: bool = Param(
         True, 'Whether a recording is played at the speed at which it was recorded, without the images for which the '
         'machine is too slow. Else it is played as fast as it can be read.')
-
-
-class RgbdFrame(NamedTuple):
-    """Images with one stamp: `color` (h, w, 3), uint8, RGB, and `depth` aligned to it."""
-
-    stamp_ns: int
-    color: np.ndarray
-    depth: DepthImage
 
 
 class Stamps(object):
@@ -108,7 +97,8 @@ class RealSense(object):
         self.camera = camera_from_intrinsics(color.get_intrinsics())
 
     def read(self):
-        """Return the next RgbdFrame, or None if no images arrive within POLL_MS.
+        """Return the stamp (nanoseconds), the RGB image and the DepthImage aligned to it of the next frame, or None if
+        no images arrive within POLL_MS.
 
         Raises CameraLost if the camera is unplugged or has sent no images for `LOST_S`, and ValueError if the images
         are incomplete; later images may be complete.
@@ -148,8 +138,8 @@ class RealSense(object):
             # Both images get the stamp of depth, because depth determines positions.
             own_clock = depth.get_frame_timestamp_domain() == self._rs.timestamp_domain.hardware_clock
             stamp_ns = self._stamps.stamp_ns(depth.get_timestamp(), own_clock, int(time.time() * NS))
-            return RgbdFrame(stamp_ns, rgb_of(np.array(color.get_data()), color.get_profile().format().name),
-                             DepthImage(np.array(depth.get_data()), self._depth_scale_m))
+            return (stamp_ns, rgb_of(np.array(color.get_data()), color.get_profile().format().name),
+                    DepthImage(np.array(depth.get_data()), self._depth_scale_m))
         except RuntimeError as error:
             raise ValueError('librealsense could not align depth to colour: %s' % error)
 

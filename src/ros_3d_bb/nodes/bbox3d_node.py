@@ -1,13 +1,11 @@
 """ROS node that estimates 3D bounding boxes from 2D bounding boxes and the depth image with the same stamp."""
-import threading
-
 import rospy
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 
 from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault
-from ros_3d_bb.conversions.camera_msgs import (COLOR_INFO_IMAGES, COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, INFO_TOPICS,
-                                               info_of_images, info_topic_beside, uncompressed)
+from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, RAW, info_of_images,
+                                               info_topic_beside, uncompressed)
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, boxes3d_to_msg, camera_from_msg,
                                                    header_of, stamp_of)
@@ -19,12 +17,10 @@ from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.master import patient_master
 from ros_3d_bb.nodes.common.part import Part
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
+from ros_3d_bb.nodes.common.rgbd_inputs import RgbdInputs
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscribe_camera_info
-from ros_3d_bb.nodes.common.tf_lookup import Transforms
-from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
-from ros_3d_bb.pipeline.rgbd_source import RgbdSource
 from ros_3d_bb.visualization.image_overlay import depth_to_grey, draw_boxes, draw_samples
 
 
@@ -32,23 +28,12 @@ class Bbox3dNode(object):
     """Estimate 3D boxes from 2D boxes and depth images.
 
     Each array of 2D boxes is paired with the depth image of the same stamp, regardless of the detector's latency.
-    Parameters: config/bbox3d.yaml; some can be changed at run time. With ~depth raw, the depth images are on
-    camera/depth/image_rect_raw and their camera_info on camera/depth/camera_info; the node registers them to the colour
-    image, using the transform between both cameras in tf.
+    Parameters: config/bbox3d.yaml; some can be changed at run time.
 
     Subscribes
     ----------
     yolo_bounding_box : std_msgs/Int32MultiArray
         2D boxes.
-    camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
-        Depth image, aligned to the colour image.
-    camera/color/camera_info : sensor_msgs/CameraInfo
-        Calibration of the colour camera.
-    /tf : tf2_msgs/TFMessage
-        Transform from ~floor_frame to the camera, for its tilt, and between the cameras for raw depth. Not used if
-        ~floor_frame is empty and depth is aligned.
-    /tf_static : tf2_msgs/TFMessage
-        As /tf.
 
     Publishes
     ---------
@@ -60,61 +45,32 @@ class Bbox3dNode(object):
         params, = read_params(Bbox3dParams, namespace=part.namespace)
         self._diagnostics = Diagnostics(part)
         self._next_stage = part.next_stage
-        depth_topic, is_raw = DEPTH_TOPICS[params.depth][0], params.depth == RAW
-        depth_info_topic = info_topic_beside(rospy.resolve_name(depth_topic))
         self._stage = EstimationStage(params, self._diagnostics)
-        transforms = (part.transforms or Transforms(wait_s=0)) if params.floor_frame or is_raw else None
-        self._source = RgbdSource(params, self._diagnostics, self._on_match, transforms,
-                                  (rospy.resolve_name(depth_topic), depth_info_topic,
-                                   rospy.resolve_name(INFO_TOPICS[0])), params.cache_length, params.assumed_delay)
-        self._lock = threading.Lock()
         self._boxes_pub = rospy.Publisher(BOXES3D_TOPIC, BoundingBox3DArray, queue_size=10)
-        self._images = SampleImages(int(params.cache_length * NS), self._stage.sample, params.depth_image_range,
-                                    self._diagnostics)
-        self._alignment = None
-        if is_raw:
-            subscribe_camera_info(depth_info_topic, depth_topic, self._on_depth_camera_info, 1)
-        else:
-            self._alignment = DepthCameraCheck(with_frames=not params.frame_id)
-            self._diagnostics.check(self._alignment.faults)
-        # Depth images are cached until their boxes arrive, so the subscriber queues must not drop any.
-        subscribe(depth_topic, Image, self._on_depth, KEPT_AT_ONCE)
-        subscribe_camera_info(INFO_TOPICS[0], COLOR_INFO_IMAGES[params.depth], self._on_camera_info)
+        self._images = SampleImages(params, self._stage, self._diagnostics)
+        self._inputs = RgbdInputs(params, self._diagnostics, self._on_match, part.transforms,
+                                  cache_s=params.cache_length, assumed_delay_s=params.assumed_delay)
+        if params.depth != RAW:
+            self._diagnostics.check(DepthCameraCheck(with_frames=not params.frame_id).faults)
         if part.subscribes:
             subscribe(BOXES_TOPIC, Int32MultiArray, self.on_boxes)
         ReconfigureServer([params], self._reconfigure, part.namespace)
 
     def _reconfigure(self, params):
-        with self._lock:
+        with self._inputs.lock:
             self._stage.reconfigure(params)
-            self._source.assumed_delay_s = params.assumed_delay
-            self._images.reconfigure(self._stage.sample, params.depth_image_range)
-
-    def _on_depth_camera_info(self, message):
-        with self._diagnostics.receiving('camera_info of depth'), self._lock:
-            self._source.add_depth_camera_info(message)
-
-    def _on_camera_info(self, message):
-        if self._alignment is not None:
-            self._alignment.color = message
-        with self._diagnostics.receiving('camera_info'), self._lock:
-            self._source.add_camera_info(message, arrival_clock_ns())
-
-    def _on_depth(self, message):
-        if self._alignment is not None:
-            self._alignment.depth_frame = message.header.frame_id
-        with self._diagnostics.receiving('depth images'), self._lock:
-            self._source.add_depth(message, arrival_clock_ns())
+            self._inputs.source.set_assumed_delay(params.assumed_delay)
+            self._images.depth_range_m = params.depth_image_range
 
     def on_boxes(self, message):
         """Process the 2D boxes of an image."""
-        with self._diagnostics.receiving('2D boxes'), self._lock:
-            self._source.add_boxes(message, arrival_clock_ns())
+        with self._diagnostics.receiving('2D boxes'), self._inputs.lock:
+            self._inputs.source.add_boxes(message, arrival_clock_ns())
 
     def _on_match(self, boxes2d, depth_msg, camera):
         """Publish the 3D boxes of one image, once its 2D boxes, depth image and camera model have arrived."""
         with self._diagnostics.rejecting('2D boxes'):
-            frame = self._source.frame(boxes2d, depth_msg, camera)
+            frame = self._inputs.source.frame(boxes2d, depth_msg, camera)
             boxes3d = self._stage.estimate(frame, boxes2d)
             message = boxes3d_to_msg(boxes3d, header_of(frame), frame.received_camera)
             self._boxes_pub.publish(message)
@@ -127,9 +83,8 @@ class Bbox3dNode(object):
 class DepthCameraCheck(object):
     """Check that the depth images are aligned to the colour images.
 
-    The node sets the attributes `color` (the latest CameraInfo) and `depth_frame`. `with_frames` states whether the
-    frame names are reliable. The topic stays subscribed: on a new subscription, rospy would wait for an unreachable
-    master and block all other requests to it.
+    `with_frames` states whether the frame names are reliable. The topics stay subscribed: on a new subscription, rospy
+    would wait for an unreachable master and block all other requests to it.
 
     Subscribes
     ----------
@@ -140,15 +95,17 @@ class DepthCameraCheck(object):
 
     def __init__(self, with_frames):
         self._with_frames = with_frames
-        self.color, self.depth_frame, self._depth = None, '', None
+        self._color, self._depth, self._depth_frame = None, None, ''
         self._depth_topic = rospy.resolve_name(DEPTH_TOPIC)
+        subscribe(DEPTH_TOPIC, Image, self._on_depth_image, KEPT_AT_ONCE)
+        subscribe_camera_info(INFO_TOPICS[0], DEPTH_TOPIC, self._on_color_camera)
         rospy.Subscriber(info_topic_beside(self._depth_topic), CameraInfo, self._on_depth_camera, queue_size=1)
 
     def faults(self):
         """Yield (event, sentence) for each current fault. Called once per second."""
-        color, depth, fault = self.color, self._depth, ''
+        color, depth, fault = self._color, self._depth, ''
         if color is not None and self._with_frames:
-            fault = frames_fault(color.header.frame_id, self.depth_frame)
+            fault = frames_fault(color.header.frame_id, self._depth_frame)
         if color is not None and depth is not None and not fault:
             try:
                 fault = intrinsics_fault(camera_from_msg(color), camera_from_msg(depth))
@@ -157,12 +114,20 @@ class DepthCameraCheck(object):
         if fault:
             yield 'alignment', 'depth is not aligned to colour: %s; positions are wrong; %s' % (fault, ALIGN)
 
+    def _on_depth_image(self, message):
+        self._depth_frame = message.header.frame_id
+
+    def _on_color_camera(self, message):
+        self._color = message
+
     def _on_depth_camera(self, message):
         self._depth = info_of_images(message, self._depth_topic)
 
 
 class SampleImages(object):
     """Publish the images and depth samples from which 3D boxes were estimated.
+
+    Depth from `depth_range_m` on is drawn as black.
 
     Subscribes
     ----------
@@ -179,26 +144,22 @@ class SampleImages(object):
         Depth image in grey; published only if there are subscribers.
     """
 
-    def __init__(self, cache_ns, sample, depth_range_m, diagnostics):
-        self._diagnostics = diagnostics
-        self.reconfigure(sample, depth_range_m)
+    def __init__(self, params, stage, diagnostics):
+        self._stage, self._diagnostics, self.depth_range_m = stage, diagnostics, params.depth_image_range
         self._raw_pub, self._color_pub, self._depth_pub = (
             rospy.Publisher('ros_3d_bb/' + name, Image, queue_size=1) for name in ('raw', 'color', 'depth'))
-        self._cache_ns, self._colors, self._subscriber = cache_ns, MessageCache(cache_ns), None
+        self._cache_ns = int(params.cache_length * NS)
+        self._colors, self._unsubscribe = MessageCache(self._cache_ns), None
         # In a separate thread, because an unresponsive master must not block the 3D boxes.
         self._subscription = NewestWorker(self._subscribe, self._on_error)
-
-    def reconfigure(self, sample, depth_range_m):
-        """Set the sampling function and the depth (metres) drawn as black for the next images."""
-        self._sample, self._depth_range_m = sample, depth_range_m
 
     def publish(self, header, depth, boxes):
         """Publish the debug images of one set of 3D boxes on the topics that have subscribers."""
         needs_raw, needs_color = self._raw_pub.get_num_connections() > 0, self._color_pub.get_num_connections() > 0
-        if (needs_raw or needs_color) != (self._subscriber is not None):
+        if (needs_raw or needs_color) != (self._unsubscribe is not None):
             self._subscription.offer(needs_raw or needs_color)
         if self._depth_pub.get_num_connections():
-            grey = depth_to_grey(depth, self._depth_range_m)
+            grey = depth_to_grey(depth, self.depth_range_m)
             self._depth_pub.publish(fill_image(Image(header=header), grey, 'mono8'))
         color = self._colors.nearest(header.stamp.to_nsec())
         if color is None:
@@ -212,17 +173,17 @@ class SampleImages(object):
                 for box in boxes:
                     draw_boxes(image, [box.rect_px], [described(box.label, '%.2f m' % box.center_m[2])])
                 for box in boxes:
-                    draw_samples(image, box.rect_px, self._sample(depth, box.rect_px))
+                    draw_samples(image, box.rect_px, self._stage.estimator.sample(depth, box.rect_px))
                 self._color_pub.publish(fill_image(Image(header=header), image, 'rgb8'))
 
     def _subscribe(self, wanted):
         """Subscribe to colour images or unsubscribe from them."""
         patient_master().getPid()  # raises if there is no master, for which rospy would hold a lock, even at Ctrl-C
-        if wanted and self._subscriber is None:
-            self._subscriber = subscribe(COLOR_TOPIC, Image, self._on_color, KEPT_AT_ONCE)
-        elif not wanted and self._subscriber is not None:
-            self._subscriber.unregister()
-            self._subscriber, self._colors = None, MessageCache(self._cache_ns)
+        if wanted and self._unsubscribe is None:
+            self._unsubscribe = subscribe(COLOR_TOPIC, Image, self._on_color, KEPT_AT_ONCE)
+        elif not wanted and self._unsubscribe is not None:
+            self._unsubscribe()
+            self._unsubscribe, self._colors = None, MessageCache(self._cache_ns)
 
     def _on_error(self, error):
         self._diagnostics.warn('colour images not subscribed', 'the ROS master does not respond (%s): the subscription '
@@ -234,5 +195,4 @@ class SampleImages(object):
 
 
 def main():
-    """Run the node."""
     run_node('bbox3d_node', Bbox3dNode)

@@ -6,15 +6,13 @@ import rospy
 import tf2_ros
 from sensor_msgs.msg import Image
 
-from ros_3d_bb.conversions.camera_msgs import (DEPTH_TOPICS, INFO_TOPICS, info_topic_beside, transform_messages,
-                                               uncompressed)
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, INFO_TOPICS, RAW, info_topic_beside, transform_messages
 from ros_3d_bb.core.params import DEPTH, DEPTH_SCALE, IMAGE_ROTATION, Param, parameters
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import subscribe, subscribe_camera_info
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.pipeline.camera_pose import POSE_FITTED, POSE_TEXT, CameraPoseStage
-from ros_3d_bb.pipeline.depth_registration import RAW
 
 
 @parameters()
@@ -61,8 +59,8 @@ class CameraPoseNode(object):
         self._diagnostics.show('pose', lambda: POSE_TEXT % self._stage.pose if self._is_done else 'unknown')
         depth_topic = DEPTH_TOPICS[params.depth][0]
         info_topic = info_topic_beside(rospy.resolve_name(depth_topic)) if params.depth == RAW else INFO_TOPICS[0]
-        self._subscriptions = [subscribe_camera_info(info_topic, depth_topic, self._on_camera_info, 1),
-                               subscribe(depth_topic, Image, self._on_depth, 1)]
+        self._unsubscribers = (subscribe_camera_info(info_topic, depth_topic, self._on_camera_info, 1),
+                               subscribe(depth_topic, Image, self._on_depth, 1))
 
     def _on_camera_info(self, message):
         with self._diagnostics.receiving('camera_info'), self._lock:
@@ -72,7 +70,7 @@ class CameraPoseNode(object):
         with self._diagnostics.receiving('depth images'), self._lock:
             if self._is_done:
                 return
-            is_visible = self._stage.add_depth(uncompressed(message))
+            is_visible = self._stage.add_depth(message)
             if is_visible is not None:
                 self._diagnostics.count('images processed')
             if is_visible is False:
@@ -84,14 +82,14 @@ class CameraPoseNode(object):
 
     def _publish(self, stamp):
         """Publish the pose. Raises ValueError if tf contains it already."""
-        link = self._transforms.link_to_root(self._frame_world, self._stage.frame_id, self._stage.floor_from_camera)
+        link = self._transforms.buffer.link_to_root(self._frame_world, self._stage.frame_id,
+                                                    self._stage.floor_from_camera)
         self._broadcaster.sendTransform(transform_messages(stamp, [link]))
         self._is_done = True
-        for subscription in self._subscriptions:
-            subscription.unregister()
+        for unsubscribe in self._unsubscribers:
+            unsubscribe()
         self._diagnostics.note(POSE_FITTED, '%s (from %s to %s)' % ((POSE_TEXT % self._stage.pose,) + link[:2]))
 
 
 def main():
-    """Run the node."""
     run_node('camera_pose_node', CameraPoseNode)

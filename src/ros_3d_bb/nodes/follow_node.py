@@ -163,5 +163,4 @@ class FollowNode(object):
 
 
 def main():
-    """Run the node."""
     run_node('follow_node', FollowNode)

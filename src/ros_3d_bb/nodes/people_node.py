@@ -46,5 +46,4 @@ class PeopleNode(object):
 
 
 def main():
-    """Run the node."""
     run_node('people_node', PeopleNode, parts=('tracker_node', 'bbox3d_node', 'yolov5_node', 'depth_detector_node'))

@@ -76,7 +76,7 @@ class PeopleRemovalNode(object):
         self._params, self._camera = params, None
         self._diagnostics, self._transforms = Diagnostics(), Transforms(params.tf_timeout)
         self._diagnostics.show('tf age', self._transforms.age)
-        self._tracks = LatestTracks(self._diagnostics, params.timeout, lambda _tracks: None)
+        self._tracks = LatestTracks(self._diagnostics, params.timeout)
         removers = {'scan': self._without_in_scan, 'points': self._without_in_cloud, 'depth': self._without_in_depth}
         self._pubs = {name: rospy.Publisher('~%s_static' % name, KINDS[name], queue_size=2) for name in params.inputs}
         if 'depth' in params.inputs:
@@ -96,7 +96,7 @@ class PeopleRemovalNode(object):
 
     def _without_people(self, name, remover, message):
         """Return the message without people, or itself if it is unknown where they are."""
-        newest, _age_s = self._tracks.newest()
+        newest = self._tracks.newest()
         try:
             if newest is not None:
                 ahead_s = (stamp_of(message) - newest.stamp_ns) / NS
@@ -129,5 +129,4 @@ class PeopleRemovalNode(object):
 
 
 def main():
-    """Run the node."""
     run_node('people_removal_node', PeopleRemovalNode)

@@ -16,7 +16,7 @@ from ros_3d_bb.nodes.common.latest_tracks import received_tracks
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import subscribe
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
-from ros_3d_bb.planning.planner_outputs import outputs_from
+from ros_3d_bb.planning.planner_outputs import NAMES, outputs_from
 from ros_3d_bb.planning.planner_view import SAME_FRAME, predicted_to, rounding_m, with_class_widths
 
 CHECK_PERIOD_S = 0.1  # between checks of ~timeout, whatever ~resend_period is; chosen: a tenth of the default timeout
@@ -27,7 +27,7 @@ MAX_ROUNDING_M = 0.005  # largest rounding error of a coordinate: a tenth of a t
 class PlannerBridgeParams(NamedTuple):
     """Parameters of planner_bridge_node."""
 
-    outputs: list = Param(('costmap',))
+    outputs: list = Param(('costmap',), choices=NAMES)
     planner_frame: str = Param('')
     robot_frame: str = Param('base_link')
     timeout: float = Param(
@@ -179,9 +179,7 @@ class PlannerBridgeNode(object):
         return transforms
 
     def _send(self, topic, now_ns):
-        """Publish the latest tracks on one topic, in the form its planner requires. Does nothing if the required
-        transform is unknown.
-        """
+        """Publish the latest tracks on one topic, in the form its planner requires, if the transform is known."""
         received, output = self._received, topic.output
         frame_from_tracks = received.transforms.get((output.frame, output.latest_tf))
         if frame_from_tracks is None:
@@ -238,5 +236,4 @@ def _now_ns():
 
 
 def main():
-    """Run the node."""
     run_node('planner_bridge_node', PlannerBridgeNode)

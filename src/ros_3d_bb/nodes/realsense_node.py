@@ -104,20 +104,20 @@ class RealSenseNode(object):
             with self._diagnostics.rejecting('images'):
                 frame = camera.read()
                 if frame is not None:
-                    self._publish(camera, frame, links)
+                    self._publish(camera.camera, links, *frame)
                     links = ()  # /tf_static is latched
         if camera.is_over and not self._params.repeat:
             rospy.loginfo('the recording is over')
             time.sleep(SENDING_S)
             rospy.signal_shutdown('the recording is over')
 
-    def _publish(self, camera, frame, links):
-        stamp = time_from(frame.stamp_ns)
-        self._publish_time(frame.stamp_ns)
+    def _publish(self, camera, links, stamp_ns, color, depth):
+        stamp = time_from(stamp_ns)
+        self._publish_time(stamp_ns)
         if links:
             self._static_transforms.sendTransform(transform_messages(stamp, links))
         header = Header(stamp=stamp, frame_id=optical_frame(self._params.frame_prefix, 'color'))
-        for topic, message in image_messages_of(CameraFrame(header, camera.camera, frame.color, frame.depth, ())):
+        for topic, message in image_messages_of(CameraFrame(header, camera, color, depth, ())):
             self._pubs[topic].publish(message)
         self._diagnostics.count('images')
         self._diagnostics.record_latency(stamp)

@@ -67,7 +67,7 @@ class SpeedLimitNode(object):
         self._diagnostics, self._velocity = Diagnostics(), AHEAD
         self._limit_pub = rospy.Publisher('~speed_limit', Float32, queue_size=1)
         self._velocity_pub = rospy.Publisher('cmd_vel', Twist, queue_size=1)
-        self._tracks = RobotTracks(self._diagnostics, self._params, lambda _tracks: None)
+        self._tracks = RobotTracks(self._diagnostics, self._params)
         subscribe('cmd_vel_in', Twist, self._on_command, 1)
         if self._params.use_scan:
             subscribe('scan', LaserScan, self._on_scan, 1)
@@ -117,5 +117,4 @@ class SpeedLimitNode(object):
 
 
 def main():
-    """Run the node."""
     run_node('speed_limit_node', SpeedLimitNode)

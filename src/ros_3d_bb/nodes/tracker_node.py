@@ -6,7 +6,7 @@ from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import Image
 from visualization_msgs.msg import MarkerArray
 
-from ros_3d_bb.conversions.camera_msgs import (COLOR_INFO_IMAGES, DEPTH_TOPICS, INFO_TOPICS, info_topic_beside,
+from ros_3d_bb.conversions.camera_msgs import (COLOR_INFO_IMAGES, DEPTH_TOPICS, INFO_TOPICS, RAW, info_topic_beside,
                                                topic_of)
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, TRACKS_TOPIC, tracks_to_msg
 from ros_3d_bb.core.latest_worker import NewestWorker
@@ -19,7 +19,6 @@ from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params, run_node
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscribe_camera_info
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
-from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams, TrackingStage
 from ros_3d_bb.visualization.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter
 
@@ -135,12 +134,8 @@ class TrackIdReservation(object):
 
     The largest reserved ID is stored on the parameter server, which outlives the node. The parameter is outside the
     node's namespace (`/tracker_node_numbers`), because roslaunch clears private parameters. IDs are also assigned while
-    the master is unreachable. `last_id` is the last ID that was reserved before the node was started.
-
-    Raises
-    ------
-    ValueError
-        If the parameter is not a valid ID.
+    the master is unreachable. `last_id` is the last ID that was reserved before the node was started. Raises ValueError
+    if the parameter is not a valid ID.
     """
 
     def __init__(self, diagnostics, part=Part()):
@@ -170,5 +165,4 @@ class TrackIdReservation(object):
 
 
 def main():
-    """Run the node."""
     run_node('tracker_node', TrackerNode)

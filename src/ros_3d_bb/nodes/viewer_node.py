@@ -237,10 +237,7 @@ class ViewerNode(object):
             return None
 
     def _snapshot_to_store(self):
-        """Return the newest snapshot.
-
-        Raises ValueError if there is nothing to store, or if the boxes are missing and the user has not been warned.
-        """
+        """Return the newest snapshot. Raises ValueError without one, or without boxes before the user was warned."""
         with self._lock:
             snapshot, is_early = self._snapshots.newest, self._snapshots.is_early
         if snapshot is None:
@@ -341,5 +338,4 @@ def _complain(future):
 
 
 def main():
-    """Run the node."""
     run_node('viewer_node', ViewerNode, ViewerNode.run)

@@ -53,10 +53,7 @@ class Yolov5Node(object):
         subscribe(COLOR_TOPIC, Image, self._on_image, 1)
         rospy.loginfo('detecting %s with %s on %s', ', '.join(map(str, detection.classes)), params.weights,
                       self._detector.description)
-        ReconfigureServer(given, self._reconfigure, part.namespace)
-
-    def _reconfigure(self, _params, detection, _running):
-        self._set_params(detection)
+        ReconfigureServer(given, lambda _params, detection, _running: self._set_params(detection), part.namespace)
 
     def _set_params(self, detection):
         """Use DetectionParams from the next image on, with the adaptive size if it is wanted.
@@ -85,5 +82,4 @@ class Yolov5Node(object):
 
 
 def main():
-    """Run the node."""
     run_node('yolov5_node', Yolov5Node)

@@ -1,10 +1,10 @@
 """Pose of a camera that tf does not contain, from the floor in its depth images."""
 from ros_3d_bb.camera.image_rotation import mounted_camera, turned_camera, turned_depth, turns_for
+from ros_3d_bb.conversions.camera_msgs import RAW
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
 from ros_3d_bb.conversions.perception_msgs import camera_from_msg, stamp_of
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.depth.ground_plane import camera_pose_above, fit_floor
-from ros_3d_bb.pipeline.depth_registration import RAW
 
 FLOOR = 'floor'  # value of the option and the launch argument camera_pose
 POSE_FITTED = 'poses fitted to the floor'  # event
@@ -16,12 +16,8 @@ IMAGES, PERIOD_NS = 8, NS // 4
 class CameraPoseStage(object):
     """Fits the pose of a camera to the floor in its depth images, of which at most one each `PERIOD_NS` is used.
 
-    With raw depth, it is the pose of the depth camera, which tf connects with the colour camera.
-
-    Parameters
-    ----------
-    params : NamedTuple
-        With ~depth, ~depth_scale, ~frame_id and ~image_rotation.
+    With raw depth, it is the pose of the depth camera, which tf connects with the colour camera. `params` has ~depth,
+    ~depth_scale, ~frame_id and ~image_rotation.
     """
 
     def __init__(self, params):

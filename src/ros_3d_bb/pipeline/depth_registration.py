@@ -2,21 +2,15 @@
 import numpy as np
 import tf2_ros
 
-from ros_3d_bb.camera.registration import RegisteredDepth, Registration
+from ros_3d_bb.camera.registration import Registration
 from ros_3d_bb.conversions.perception_msgs import NEWEST, camera_from_msg
-
-RAW = 'raw'  # value of ~depth
 
 
 class DepthRegistration(object):
     """Register raw depth images to the colour camera.
 
-    Parameters
-    ----------
-    transforms
-        As for `tracking_stage.TrackingStage`. The latest transform is used: the cameras are fixed to each other.
-    info_topic : str
-        Topic of the camera_info of the depth camera, for the error message if it is missing.
+    `transforms` is as for `tracking_stage.TrackingStage`; the latest transform is used, as the cameras are fixed to
+    each other. `info_topic`, that of the depth camera's camera_info, is named in the error message if it is missing.
     """
 
     def __init__(self, transforms, info_topic):
@@ -27,17 +21,10 @@ class DepthRegistration(object):
         """Add a sensor_msgs/CameraInfo of the depth camera; it is used for all images until the next."""
         self._depth_camera = camera_from_msg(message)
 
-    def register(self, depth, depth_frame, color_camera, color_frame):
-        """Return the RegisteredDepth of a raw DepthImage. Raises ValueError as `geometry`."""
-        return RegisteredDepth(depth, self.geometry(depth, depth_frame, color_camera, color_frame))
-
     def geometry(self, depth, depth_frame, color_camera, color_frame):
         """Return the Registration for a DepthImage, given the optical frames of both cameras.
 
-        Raises
-        ------
-        ValueError
-            If there is no camera_info of depth, it has another size, or the transform is missing.
+        Raises ValueError if there is no camera_info of depth, it has another size, or the transform is missing.
         """
         camera = self._depth_camera
         if camera is None:

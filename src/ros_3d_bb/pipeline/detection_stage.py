@@ -4,7 +4,7 @@ from typing import NamedTuple
 import tf2_ros
 
 from ros_3d_bb.camera.camera_model import transform_from
-from ros_3d_bb.camera.image_rotation import AUTO, turned_image, turns_for, unturned_boxes
+from ros_3d_bb.camera.image_rotation import AUTO, turned_boxes, turned_image, turns_for
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import NEWEST, stamp_of
 from ros_3d_bb.core.params import (DEPTH, DEPTH_SCALE, ENABLED, IMAGE_ROTATION, PUBLISH_EMPTY, STAMP_TOLERANCE, Param,
@@ -50,23 +50,17 @@ def detect_in_color(detector, message, turns=0):
     """
     stamp_of(message)
     image = imgmsg_to_rgb(message)
-    height, width = image.shape[:2]
-    detections = detector.detect(turned_image(image, turns))
-    return image, detections._replace(boxes=unturned_boxes(detections.boxes, turns, width, height))
+    upright = turned_image(image, turns)
+    detections = detector.detect(upright)
+    return image, detections._replace(boxes=turned_boxes(detections.boxes, -turns, *upright.shape[1::-1]))
 
 
 class CameraRotation(object):
     """Quarter turns that make the images of one camera upright, from ~image_rotation or tf.
 
-    The transform is looked up until it is available, and not again: the camera is fixed to the robot.
-
-    Parameters
-    ----------
-    params : Yolov5NodeParams
-    transforms
-        As for `tracking_stage.TrackingStage`. It is not used if ~image_rotation is given, or no floor frame.
-    on_known : callable
-        Called once no further lookups are necessary.
+    The transform is looked up in `transforms`, as for `tracking_stage.TrackingStage`, until it is available, and not
+    again: the camera is fixed to the robot. It is not used if ~image_rotation is given, or no ~floor_frame. `on_known`
+    is called once no further lookups are necessary.
     """
 
     def __init__(self, params, transforms, on_known=lambda: None):
@@ -90,14 +84,7 @@ class CameraRotation(object):
 
 
 class DepthDetectionStage(object):
-    """Detect people in frames with `detection.depth`.
-
-    Parameters
-    ----------
-    params : DepthDetectorParams
-    people : DepthPeopleParams
-    events : event_counter.EventCounter
-    """
+    """Detect people in frames with `detection.depth`; `params` are DepthDetectorParams, `people` DepthPeopleParams."""
 
     names = ('person',)
 
@@ -110,21 +97,15 @@ class DepthDetectionStage(object):
         self._params = params
 
     def detect(self, frame):
-        """Return the Detections in the received image of an RgbdFrame; None while the floor is unknown.
-
-        Raises ValueError if the images cannot be used.
-        """
-        detections = self._detector.detect(frame.color, frame.depth, frame.camera, self._floor(frame))
+        """Return the Detections in the received image of an RgbdFrame; None while the floor is unknown."""
+        floor = None  # the detector fits it
+        if frame.camera_from_floor is not None:
+            base_from_floor = transform_from((0, 0, self._params.floor_height), (0, 0, 0, 1))
+            floor = floor_from_transform(frame.camera_from_floor.dot(base_from_floor))
+        detections = self._detector.detect(frame.color, frame.depth, frame.camera, floor)
         if detections is None:
             self._events.warn('images without floor', 'tf gives no floor, and none is visible in the depth image; no '
                               'detection; waiting for the next image')
             return None
         self._events.count('images processed')
         return detections._replace(boxes=frame.received_rects(detections.boxes))
-
-    def _floor(self, frame):
-        """Return the floor plane from tf, or None if it is unknown, so that the detector fits it."""
-        if frame.camera_from_floor is None:
-            return None
-        base_from_floor = transform_from((0, 0, self._params.floor_height), (0, 0, 0, 1))
-        return floor_from_transform(frame.camera_from_floor.dot(base_from_floor))

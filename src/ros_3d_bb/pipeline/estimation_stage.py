@@ -48,15 +48,7 @@ class Bbox3dParams(NamedTuple):
 class EstimationStage(object):
     """Estimate the 3D boxes of frames, and correct them by an error model. `events` counts rejected boxes.
 
-    Parameters
-    ----------
-    params : Bbox3dParams
-    events : event_counter.EventCounter
-
-    Raises
-    ------
-    ValueError
-        If a parameter is invalid.
+    Raises ValueError if one of the `params`, Bbox3dParams, is invalid.
     """
 
     def __init__(self, params, events):
@@ -66,48 +58,30 @@ class EstimationStage(object):
         self.reconfigure(params)
 
     def reconfigure(self, params):
-        """Use another estimator or stride for the next boxes.
-
-        Raises ValueError, as the constructor, and keeps the old parameters if the new ones are invalid.
-        """
+        """Use another estimator or stride for the next boxes. If invalid, raise ValueError and keep the old one."""
         estimator = estimator_named(params.estimator, params.stride, self._classes)
         if self._error_model is not None:
             self._error_model.check_estimator(params.estimator)
-        self._estimator = estimator
-
-    @property
-    def sample(self):
-        """The sampling function of the estimator, see `box3d_estimator.Estimator`."""
-        return self._estimator.sample
+        self.estimator = estimator
 
     def estimate(self, frame, boxes2d):
-        """Estimate the 3D boxes of one image.
+        """Estimate the 3D boxes of one image from its RgbdFrame and Boxes2D.
 
         A 2D box yields no 3D box if it is empty or reversed, has no depth of its own, or gives an implausible size.
-
-        Parameters
-        ----------
-        frame : rgbd_frame.RgbdFrame
-        boxes2d : perception_msgs.Boxes2D
-            In the image as received.
-
-        Returns
-        -------
-        list of box3d.Box3D
-            In the optical frame of the image as received.
+        Returns a list of `box3d.Box3D`; like the 2D boxes, they belong to the image as received, and its optical frame.
         """
         usable = self._usable_boxes(boxes2d)
         rects_px = list(map(tuple, frame.upright_rects(usable.boxes).tolist()))
-        estimates = estimate_boxes(frame.depth, rects_px, frame.camera, self._estimator, _level_rotation(frame.up),
+        estimates = estimate_boxes(frame.depth, rects_px, frame.camera, self.estimator, _level_rotation(frame.up),
                                    usable.labels)
         found = [box._replace(score=score) for box, score in zip(estimates, usable.scores.tolist())
                  if box is not None]
-        boxes3d = [box for box in found if box.is_plausible]
-        implausible = [box for box in found if not box.is_plausible] if len(boxes3d) < len(found) else []
-        for box in _as_received(implausible, frame):
-            self._events.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and '
-                              '%.3g m high at %.3g m; less than %g m expected; the others in this image are used'
-                              % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2], box.largest_m)))
+        boxes3d = []
+        for box in found:
+            if box.is_plausible:
+                boxes3d.append(box)
+            else:
+                self._warn_of_size(_as_received(box, frame))
         self._check_scale(found, frame.depth_unit_m)
         counts = {'boxes estimated': len(boxes3d), 'boxes without depth': len(estimates) - len(found)}
         boxes3d = corrected_boxes(boxes3d, self._error_model, abs(frame.stamp_ns - frame.depth_stamp_ns) / NS)
@@ -116,7 +90,12 @@ class EstimationStage(object):
             counts['boxes outside of the measured range'] = len(outside)
         counts['images estimated'] = 1
         self._events.count_all(counts)
-        return _as_received(boxes3d, frame)
+        return [_as_received(box, frame) for box in boxes3d] if frame.turns else boxes3d
+
+    def _warn_of_size(self, box):
+        self._events.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and %.3g m '
+                          'high at %.3g m; less than %g m expected; the others in this image are used'
+                          % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2], box.largest_m)))
 
     def _check_scale(self, boxes3d, unit_m):
         """Warn if people have impossible heights, with the scale that makes them possible."""
@@ -139,19 +118,15 @@ class EstimationStage(object):
                                 scores=boxes2d.scores[usable])
 
 
-def _as_received(boxes3d, frame):
-    """Convert Box3Ds of the upright image to the optical frame and the pixels of the image as received."""
-    if not frame.turns:
-        return boxes3d
-    received_from_upright, converted = turned_rotation(frame.turns).T, []
-    for box in boxes3d:
-        (rect_px,) = frame.received_rects(np.array([box.rect_px])).tolist()
-        width_m, height_m, _width_m = box.size_m
-        size_m = box.size_m if frame.turns == 2 else np.array([height_m, width_m, width_m])
-        covariance_m2 = box.covariance_m2
-        if covariance_m2 is not None:
-            covariance_m2 = received_from_upright.dot(covariance_m2).dot(received_from_upright.T)
-        edges = box.truncated_edges[frame.turns:] + box.truncated_edges[:frame.turns]
-        converted.append(box._replace(center_m=received_from_upright.dot(box.center_m), size_m=size_m,
-                                      rect_px=tuple(rect_px), truncated_edges=edges, covariance_m2=covariance_m2))
-    return converted
+def _as_received(box, frame):
+    """Convert a Box3D of the upright image to the optical frame and the pixels of the image as received."""
+    received_from_upright = turned_rotation(frame.turns).T
+    (rect_px,) = frame.received_rects(np.array([box.rect_px])).tolist()
+    width_m, height_m, _width_m = box.size_m
+    size_m = np.array([height_m, width_m, width_m]) if frame.turns % 2 else box.size_m
+    covariance_m2 = box.covariance_m2
+    if covariance_m2 is not None:
+        covariance_m2 = received_from_upright.dot(covariance_m2).dot(received_from_upright.T)
+    return box._replace(center_m=received_from_upright.dot(box.center_m), size_m=size_m, rect_px=tuple(rect_px),
+                        truncated_edges=box.truncated_edges[frame.turns:] + box.truncated_edges[:frame.turns],
+                        covariance_m2=covariance_m2)

@@ -8,7 +8,7 @@ from std_msgs.msg import Int32MultiArray
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.conversions.camera_msgs import (COLOR_INFO_IMAGES, COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, IMAGE_KINDS,
-                                               INFO_TOPICS, STATIC_TOPIC, TF_TOPIC, absolute, info_of_images,
+                                               INFO_TOPICS, RAW, STATIC_TOPIC, TF_TOPIC, absolute, info_of_images,
                                                topic_of, uncompressed)
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, Boxes2D, boxes2d_from_msg,
                                                    boxes3d_to_msg, detections2d_to_msg, header_of, tracks_to_msg)
@@ -16,7 +16,6 @@ from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams
-from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.detection_stage import DepthDetectionStage, DepthDetectorParams, Yolov5NodeParams
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
 from ros_3d_bb.pipeline.rgbd_source import RgbdSource
@@ -71,16 +70,8 @@ class Settings(NamedTuple):
         topic = topic_of(camera, topic)
         return absolute(self.names.get(topic, topic))
 
-    @property
-    def publish_empty(self):
-        """Whether the detector publishes an array without boxes."""
-        return (self.depth if self.detector == 'depth' else self.yolov5)[0].publish_empty
-
     def source(self, camera, events, on_match, transforms):
-        """Return the RgbdSource of a camera, for both detection and estimation.
-
-        Raises ValueError if their parameters contradict each other.
-        """
+        """Return the RgbdSource of a camera for detection and estimation. ValueError if their parameters differ."""
         params = self.bbox3d[0]
         for name in DepthDetectorParams._fields if self.detector == 'depth' else ():
             if getattr(params, name, None) != getattr(self.depth[0], name) and name in params._fields:
@@ -91,56 +82,19 @@ class Settings(NamedTuple):
         return RgbdSource(params, events, on_match, transforms, topics, params.cache_length, params.assumed_delay)
 
 
-class CollectedResults(object):
-    """Collects the messages that the nodes would publish."""
-
-    def __init__(self, marker_params, events):
-        self._markers, self._events, self._messages = MarkerWriter(marker_params), events, []
-
-    def take(self):
-        """Return [(topic, message), ...] since the last call."""
-        messages, self._messages = self._messages, []
-        return messages
-
-    def on_boxes2d(self, camera, message):
-        """Add an Int32MultiArray."""
-        self._messages.append((topic_of(camera, BOXES_TOPIC), message))
-
-    def on_boxes3d(self, camera, message):
-        """Add a BoundingBox3DArray."""
-        self._messages.append((topic_of(camera, BOXES3D_TOPIC), message))
-
-    def on_tracks(self, tracks, header):
-        """Add tracks (`types.TrackedObject`) and their markers."""
-        self._events.count_all({TRACKED: 1} if tracks else {})
-        self._messages += [(TRACKS_TOPIC, tracks_to_msg(tracks, header)),
-                           (MARKERS_TOPIC, self._markers.write(tracks, header))]
-
-
 class PeoplePipeline(object):
-    """The three stages: detection and estimation of each camera, and tracking.
+    """The three stages: detection and estimation of each camera, and tracking. Collects what the nodes would publish.
 
     Networks detect without depth and are therefore outside: their detections are passed to `add_detections`.
-
-    Parameters
-    ----------
-    settings : Settings
-    events : event_counter.EventCounter
-    transforms
-        As for `tracking_stage.TrackingStage`.
-    results
-        Receives the results, by the methods of `CollectedResults` whose names begin with `on_`.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is invalid.
+    `transforms` is as for `tracking_stage.TrackingStage`. Raises ValueError if one of the Settings is invalid.
     """
 
-    def __init__(self, settings, events, transforms, results):
-        self._settings, self._events, self._results = settings, events, results
-        tracker_params, _marker_params, *tracking = settings.tracker
-        self._tracking_stage = TrackingStage(tracker_params, tracking, events, transforms, results.on_tracks)
+    def __init__(self, settings, events, transforms):
+        self._settings, self._events, self._results = settings, events, []
+        self._publish_empty = (settings.depth if settings.detector == 'depth' else settings.yolov5)[0].publish_empty
+        tracker_params, marker_params, *tracking = settings.tracker
+        self._markers = MarkerWriter(marker_params)
+        self._tracking_stage = TrackingStage(tracker_params, tracking, events, transforms, self._on_tracks)
         self._sources, self._detection_stages, self._estimation_stages = {}, {}, {}  # by camera
         for camera in settings.cameras:
             on_match = functools.partial(self._on_match, camera)
@@ -183,6 +137,11 @@ class PeoplePipeline(object):
         if message is not None:
             self._sources[camera].add_boxes(message, now_ns)
 
+    def take_results(self):
+        """Return the messages that the nodes would have published since the last call, [(topic, message), ...]."""
+        results, self._results = self._results, []
+        return results
+
     @contextlib.contextmanager
     def detecting(self):
         """Context manager for the detection in one image. Exceptions are reported and do not stop the pipeline."""
@@ -206,7 +165,6 @@ class PeoplePipeline(object):
                 self._detect(camera, trigger.header, self._sources[camera].frame(trigger, *messages))
 
     def _detect(self, camera, header, frame):
-        """Detect people in a frame, and track them."""
         detections = self._detection_stages[camera].detect(frame)
         if detections is None:
             return
@@ -217,15 +175,21 @@ class PeoplePipeline(object):
 
     def _boxes2d(self, camera, header, image, detections, names):
         """Return the message of Detections, None if it is not published."""
-        if not len(detections.boxes) and not self._settings.publish_empty:
+        if not len(detections.boxes) and not self._publish_empty:
             return None
         message = detections2d_to_msg(detections, names, header, image.shape[1::-1])
-        self._results.on_boxes2d(camera, message)
+        self._results.append((topic_of(camera, BOXES_TOPIC), message))
         return message
 
     def _estimate_and_track(self, camera, frame, boxes2d):
         boxes3d = self._estimation_stages[camera].estimate(frame, boxes2d)
         message = boxes3d_to_msg(boxes3d, header_of(frame), frame.received_camera)
-        self._results.on_boxes3d(camera, message)
+        self._results.append((topic_of(camera, BOXES3D_TOPIC), message))
         with self._events.rejecting('3D boxes'):
             self._tracking_stage.add_boxes(message, self._now_ns, camera)
+
+    def _on_tracks(self, tracks, header):
+        if tracks:
+            self._events.count(TRACKED)
+        self._results += [(TRACKS_TOPIC, tracks_to_msg(tracks, header)),
+                          (MARKERS_TOPIC, self._markers.write(tracks, header))]

@@ -2,13 +2,14 @@
 import tf2_ros
 
 from ros_3d_bb.camera.alignment import ALIGN, size_fault
+from ros_3d_bb.camera.registration import RegisteredDepth
 from ros_3d_bb.camera.rgbd_frame import RgbdFrame, upright_frame
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, INFO_TOPICS
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, INFO_TOPICS, RAW
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (NEWEST, Boxes2D, boxes2d_from_msg, camera_from_msg, stamp_if_any,
                                                    stamp_of)
 from ros_3d_bb.core.time_sync import NS, StampSynchronizer
-from ros_3d_bb.pipeline.depth_registration import RAW, DepthRegistration
+from ros_3d_bb.pipeline.depth_registration import DepthRegistration
 
 UNSTAMPED = '2D boxes without a stamp'  # event, reported once
 TILT_UNKNOWN = 'tilt of the camera unknown'  # event, reported once
@@ -18,21 +19,13 @@ class RgbdSource(object):
     """Pairs colour images or 2D boxes with the depth image and camera_info of their stamp, and makes frames of them.
 
     Each `add_` method validates a message, raising ValueError, and adds it with its arrival time (integer nanoseconds,
-    see `time_sync.StampSynchronizer`).
+    see `time_sync.StampSynchronizer`). `on_match` is called with the arguments of `frame` when the messages of one
+    stamp are complete.
 
-    Parameters
-    ----------
-    params : NamedTuple
-        With ~depth, ~depth_scale, ~stamp_tolerance, ~frame_id, ~floor_frame and ~image_rotation.
-    events : event_counter.EventCounter
-    on_match : callable
-        Called with the arguments of `frame` when the messages of one stamp are complete.
-    transforms
-        As for `tracking_stage.TrackingStage`, for the floor and raw depth; None if neither is used.
-    topics : sequence of str, optional
-        Topics of the depth images, their camera_info and that of colour, for error messages about missing ones.
-    cache_s, assumed_delay_s : float, optional
-        See `StampSynchronizer`; the delay is also an attribute.
+    `params` has ~depth, ~depth_scale, ~stamp_tolerance, ~frame_id, ~floor_frame and ~image_rotation. `transforms` is as
+    for `tracking_stage.TrackingStage`, for the floor and raw depth; None if neither is used. `topics` are those of the
+    depth images, their camera_info and that of colour, for error messages about missing ones. `cache_s` and
+    `assumed_delay_s` are for the StampSynchronizer.
     """
 
     def __init__(self, params, events, on_match, transforms=None, topics=DEPTH_TOPICS['aligned'] + INFO_TOPICS[:1],
@@ -45,13 +38,8 @@ class RgbdSource(object):
                                        self._on_frame, self._on_lost)
         self._on_match, self._used_ns = on_match, None
 
-    @property
-    def assumed_delay_s(self):
-        """Latency of the detector, for 2D boxes without a stamp."""
-        return self._sync.assumed_delay_ns / NS
-
-    @assumed_delay_s.setter
-    def assumed_delay_s(self, delay_s):
+    def set_assumed_delay(self, delay_s):
+        """Set the latency of the detector, for 2D boxes without a stamp."""
         self._sync.assumed_delay_ns = int(delay_s * NS)
 
     def add_camera_info(self, message, now_ns):
@@ -65,11 +53,9 @@ class RgbdSource(object):
         self._registration.add_camera_info(message)
 
     def add_depth(self, message, now_ns):
-        """Add a depth image."""
         self._sync.add_depth(stamp_of(message), now_ns, message)
 
     def add_color(self, message, now_ns):
-        """Add a colour image."""
         self._sync.add_boxes(stamp_of(message), now_ns, message)
 
     def add_boxes(self, message, now_ns):
@@ -77,7 +63,8 @@ class RgbdSource(object):
         boxes2d = boxes2d_from_msg(message)
         if boxes2d.stamp_ns is None and UNSTAMPED not in self._events.counts:
             self._events.note(UNSTAMPED, 'the 2D boxes have no stamp: each array is paired with the depth image that '
-                              'arrived nearest to %.3f s before it (~assumed_delay)' % self.assumed_delay_s)
+                              'arrived nearest to %.3f s before it (~assumed_delay)'
+                              % (self._sync.assumed_delay_ns / NS))
         self._events.count('arrays of 2D boxes')
         self._sync.add_boxes(boxes2d.stamp_ns, now_ns, boxes2d)
 
@@ -86,28 +73,20 @@ class RgbdSource(object):
         self._sync.end()
 
     def frame(self, trigger, depth_msg, camera):
-        """Return the RgbdFrame of matched messages.
+        """Return the RgbdFrame of matched messages: the colour image, or the Boxes2D in it (the frame then has no
+        colour); the depth image; and the Camera.
 
-        Parameters
-        ----------
-        trigger : sensor_msgs/Image or perception_msgs.Boxes2D
-            The colour image, or the 2D boxes in it; then the frame has no colour.
-        depth_msg : sensor_msgs/Image
-        camera : camera_model.Camera
-
-        Raises
-        ------
-        ValueError
-            If an image cannot be read, the colour image has another size than its camera_info, or the depth image has
-            another size than the camera or cannot be registered.
+        Raises ValueError if an image cannot be read, the colour image has another size than its camera_info, or the
+        depth image has another size than the camera or cannot be registered.
         """
         received = imgmsg_to_depth(depth_msg, self._params.depth_scale, check_unit=True)
         depth, frame_id = self._aligned(received, depth_msg.header.frame_id, camera)
-        depth_stamp_ns, stamp_ns = depth_msg.header.stamp.to_nsec(), _stamp_ns(trigger)
-        if stamp_ns is None:
-            stamp_ns = depth_stamp_ns
-        color = None if isinstance(trigger, Boxes2D) else imgmsg_to_rgb(trigger)
-        size = trigger.image_size if color is None else color.shape[1::-1]
+        depth_stamp_ns = depth_msg.header.stamp.to_nsec()
+        if isinstance(trigger, Boxes2D):
+            color, size, stamp_ns = None, trigger.image_size, trigger.stamp_ns or depth_stamp_ns
+        else:
+            color = imgmsg_to_rgb(trigger)
+            size, stamp_ns = color.shape[1::-1], trigger.header.stamp.to_nsec()
         if size not in (None, (camera.width, camera.height)):
             raise ValueError('the colour image has %d x %d pixels, its camera_info on %s is for %d x %d: remap the '
                              'camera_info of this image' % (size + (self._info_topic, camera.width, camera.height)))
@@ -119,7 +98,8 @@ class RgbdSource(object):
         """Return a depth image with the pixels of colour, and the frame of the colour camera."""
         if self._registration is not None:
             frame_id = self._params.frame_id or self._color_frame
-            return self._registration.register(depth, depth_frame, camera, frame_id), frame_id
+            registration = self._registration.geometry(depth, depth_frame, camera, frame_id)
+            return RegisteredDepth(depth, registration), frame_id
         height, width = depth.shape
         if (width, height) != (camera.width, camera.height):
             raise ValueError('%s; depth must be aligned to colour: %s' % (size_fault(camera, width, height), ALIGN))
@@ -142,23 +122,22 @@ class RgbdSource(object):
                                   % (self._params.floor_frame, frame_id, error))
             return None
 
-    def _on_frame(self, trigger, depth_msg, camera):
+    def _on_frame(self, trigger, depth, camera):
         """Pass matched messages on, but only once if a depth image is nearest to several colour images: positions have
         its stamp."""
-        depth_stamp_ns = stamp_of(depth_msg)
-        if depth_stamp_ns == self._used_ns and _stamp_ns(trigger) not in (None, depth_stamp_ns):
+        if depth.stamp_ns == self._used_ns and trigger.stamp_ns != depth.stamp_ns:
             self._events.count('images with a used depth image')
             return
-        self._used_ns = depth_stamp_ns
-        self._on_match(trigger, depth_msg, camera)
+        self._used_ns = depth.stamp_ns
+        self._on_match(trigger.value, depth.value, camera)
 
     def _on_lost(self, trigger, before_jump):
-        inputs, stamp_ns = '2D boxes' if isinstance(trigger, Boxes2D) else 'colour images', _stamp_ns(trigger)
+        inputs = '2D boxes' if isinstance(trigger.value, Boxes2D) else 'colour images'
         if before_jump:
             self._events.count('%s from before a time jump' % inputs)
             return
         with self._events.rejecting(inputs):
-            raise ValueError(self._why_lost(stamp_ns))
+            raise ValueError(self._why_lost(trigger.stamp_ns))
 
     def _why_lost(self, stamp_ns):
         """Return an error message that names the missing input and its topic."""
@@ -176,8 +155,3 @@ class RgbdSource(object):
                     % (stamp_ns / NS, self._depth_topic, newest_ns / NS, self._cache_s, too_old_s))
         return ('no depth image with their stamp %.3f received on %s: %s'
                 % (stamp_ns / NS, self._depth_topic, self._sync.gap_text(stamp_ns)))
-
-
-def _stamp_ns(trigger):
-    """Stamp of a colour image, or of the one that 2D boxes are in; None if these have no stamp."""
-    return trigger.stamp_ns if isinstance(trigger, Boxes2D) else stamp_of(trigger)

@@ -10,7 +10,7 @@ from std_msgs.msg import Header
 
 from ros_3d_bb.camera.alignment import POSE, target_frame_fault
 from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, topic_of
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, RAW, topic_of
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
 from ros_3d_bb.conversions.map_msgs import occupied_from_msg
 from ros_3d_bb.conversions.perception_msgs import camera_from_msg, stamp_of, time_from, usable_boxes3d
@@ -19,7 +19,7 @@ from ros_3d_bb.core.object_classes import read_object_classes
 from ros_3d_bb.core.params import CLASSES_FILE, DEPTH, DEPTH_SCALE, SET_BY_LAUNCH, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, MessageCache
 from ros_3d_bb.estimation.error_model import error_model_of_param
-from ros_3d_bb.pipeline.depth_registration import RAW, DepthRegistration
+from ros_3d_bb.pipeline.depth_registration import DepthRegistration
 from ros_3d_bb.tracking.measurement_model import NoiseParams
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker, ThesisTrackerParams
@@ -65,35 +65,16 @@ class TrackingStage(object):
 
     If there is no transform at the stamp of the boxes, there is no result and tracks do not age. Each message is passed
     with the namespace of its camera, '' for a single one; boxes and depth images also with their arrival time `now_ns`
-    (integer nanoseconds) on a clock chosen by the caller. The methods are thread-safe.
+    (integer nanoseconds) on a clock chosen by the caller. The methods are thread-safe. The constructor and
+    `reconfigure` raise ValueError if a parameter is invalid.
 
-    Parameters
-    ----------
-    params : TrackerNodeParams
-    tracking : list
-        One instance of each of `TRACKING_PARAMS`.
-    events : event_counter.EventCounter
-    transforms
-        Its `lookup(target_frame, source_frame, stamp)` returns target_from_source (4, 4) or raises
-        tf2_ros.TransformException.
-    on_tracks : callable
-        Called with the tracks (list of `types.TrackedObject`) after each image and their header, which has the newest
-        stamp and the fixed frame. `lock` is held meanwhile.
-    last_id : int
-        The IDs of tracks are greater.
+    `tracking` has one instance of each of `TRACKING_PARAMS`. The method `lookup(target_frame, source_frame, stamp)` of
+    `transforms` returns target_from_source (4, 4) or raises tf2_ros.TransformException. `on_tracks` is called with the
+    tracks (list of `types.TrackedObject`) after each image and their header, which has the newest stamp and the fixed
+    frame; `lock` is held meanwhile. The IDs of tracks are greater than `last_id`.
 
-    Attributes
-    ----------
-    cameras : tuple of str
-        Namespaces of the cameras; '' for a single camera.
-    uses_camera_info, uses_depth : bool
-        Which other messages are used. The thesis tracker considers neither the field of view nor occlusion.
-    lock : threading.RLock
-
-    Raises
-    ------
-    ValueError
-        If a parameter is invalid.
+    Attributes: `cameras`, the namespaces of the cameras; `uses_camera_info` and `uses_depth`, whether these messages
+    are used: the thesis tracker considers neither the field of view nor occlusion; and `lock`.
     """
 
     def __init__(self, params, tracking, events, transforms, on_tracks, last_id=0):
@@ -112,7 +93,7 @@ class TrackingStage(object):
         self._clocks = CameraClocks()
         self._jumps = 0  # number of backward jumps in time
         self._boxes_ns = {}  # newest stamp of tracked boxes, by camera
-        self._frames, self._usable_frames, self._intrinsics = {}, {}, {}  # by camera
+        self._frames, self._intrinsics = {}, {}  # by camera
         self._depths = {camera: MessageCache(int(params.depth_cache_length * NS)) for camera in self.cameras}
         self._registrations = {camera: DepthRegistration(transforms, topic_of(camera, DEPTH_TOPICS[RAW][1]))
                                for camera in self.cameras if params.depth == RAW}
@@ -161,11 +142,8 @@ class TrackingStage(object):
         """
         stamp_ns, camera_name = stamp_of(message), camera or message.header.frame_id
         frame_id, target_frame = self._params.camera_frame or message.header.frame_id, self._params.target_frame
-        if self._usable_frames.get(camera) != frame_id:
-            fault = target_frame_fault(target_frame, frame_id)
-            if fault:
-                raise ValueError('%s (~target_frame); %s' % (fault, POSE))
-            self._usable_frames[camera] = frame_id
+        if frame_id.lstrip('/') == target_frame:
+            raise ValueError('%s (~target_frame); %s' % (target_frame_fault(target_frame, frame_id), POSE))
         with self.lock:
             if not self._accept(stamp_ns, now_ns, camera):
                 return
@@ -199,9 +177,9 @@ class TrackingStage(object):
         detections = detections_from_boxes(boxes, fixed_from_camera, self._classes)
         tracks = self._tracker.update(stamp_ns, detections,
                                       self._view(message.header, fixed_from_camera, camera, camera_name))
-        ignored = sum(self._tracker.ignored.contains(detection.position_m, fixed_from_camera[:2, 3])
-                      for detection in detections)
-        if ignored:
+        areas = self._tracker.ignored
+        if areas.polygons or areas.occupied is not None:
+            ignored = sum(areas.contains(detection.position_m, fixed_from_camera[:2, 3]) for detection in detections)
             self._events.count('boxes in ignored areas', ignored)
         self._events.count('images tracked')
         if self._tracker.untracked_boxes > untracked:

@@ -66,7 +66,8 @@ class TransformBuffer(tf2_ros.BufferCore):
         try:
             return transform_from_msg(self.lookup_transform_core(target, source, stamp))
         except tf2_ros.TransformException:
-            if not self._is_blocked(target, source, stamp.to_sec()):
+            between, stamp_s = self._between(target, source), stamp.to_sec()  # the stamp 0 means the latest transform
+            if not any(0 < stamp_s < self._rejected_before_s.get(frame, 0) for frame in between):
                 raise
         self._clear_after(stamp.to_sec() + CACHE_S)
         return transform_from_msg(self.lookup_transform_core(target, source, stamp))
@@ -91,10 +92,6 @@ class TransformBuffer(tf2_ros.BufferCore):
             raise ValueError('tf contains the pose of %s in %s already; one without it expected (--camera-height, '
                              '--camera-pose; camera_height:=, camera_pose:=)' % (frame, target))
         return target, root, target_from_frame.dot(self.lookup(frame, root, NEWEST))
-
-    def _is_blocked(self, target, source, stamp_s):
-        """Whether transforms at a stamp were rejected of a frame between two others. A stamp of 0 means the latest."""
-        return any(0 < stamp_s < self._rejected_before_s.get(frame, 0) for frame in self._between(target, source))
 
     def _between(self, target, source):
         return set(path_to_root(self._parents, target)) ^ set(path_to_root(self._parents, source))

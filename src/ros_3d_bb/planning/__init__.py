@@ -1,4 +1,1 @@
-"""Tracks for planners: conversion to the planner's frame, and the outputs of planner_bridge_node.
-
-May import: camera, conversions, core, tracking.
-"""
+"""Tracks for planners: conversion to the planner's frame, and the outputs of planner_bridge_node."""

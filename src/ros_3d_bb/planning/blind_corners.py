@@ -11,14 +11,8 @@ LEAST_ROOM_M, LEAST_WIDTH_M = 0.5, 0.35
 def blind_corners(ranges_m, limits_m, first_angle, step):
     """Blind corners (n, 3) in a planar scan, in the frame of the laser.
 
-    Parameters
-    ----------
-    ranges_m : sequence of float, (n,)
-        Ranges as in REP 117: infinite without a return, nan if they are invalid.
-    limits_m : (float, float)
-        Least and largest range of the laser.
-    first_angle, step : float
-        Angle of the first beam, and between two beams.
+    The ranges (n,) are as in REP 117: infinite without a return, nan if they are invalid; `limits_m` are the least and
+    the largest one of the laser. The angles are those of the first beam and between two beams.
     """
     least_m, largest_m = limits_m
     limited_m = np.minimum(ranges_m, largest_m)

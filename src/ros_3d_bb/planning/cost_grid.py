@@ -23,26 +23,17 @@ CENTERS_M = (np.arange(int(round(2 * HALF_SIZE_M / CELL_M))) + 0.5) * CELL_M - H
 
 def presence_costs(tracks, robot_from_tracks, robot_radius_m):
     """Costs of the cells around the robot: the largest probability, over the times of the prediction, that a person or
-    the comfort zone around the body covers the cell, minus that person's probability at the robot, relative to `RISKY`.
-    The highest cost of all people counts. Places where the robot is less in the way of a person than now have no cost,
-    so that it leaves the way instead of stopping in it.
+    the comfort zone around the body covers the cell, minus that person's probability at the robot, relative to
+    `RISKY`. The highest cost of all people counts. Places where the robot is less in the way of a person than now
+    have no cost, so that it leaves the way instead of stopping in it.
 
     The probability that a disc of radius r covers a point at the offset d from its expected centre is approximated by
     pi r² N(d; 0, C + r²/4 I), where C is the covariance of the centre, narrowed by `ACROSS`: the disc is replaced by a
     Gaussian with the same area and second moments.
 
-    Parameters
-    ----------
-    tracks : list of TrackedObject
-        Those that do not move are expected to stay.
-    robot_from_tracks : numpy.ndarray, (4, 4)
-    robot_radius_m : float
-        Of the disc around the origin in which the highest probability counts as that at the robot.
-
-    Returns
-    -------
-    numpy.ndarray, (n, n), int8
-        0 to `HIGHEST`. Rows are along y, columns along x; the robot is in the middle.
+    Tracks (TrackedObject) that do not move are expected to stay. The highest probability in the disc with the radius
+    `robot_radius_m` around the origin counts as that at the robot. Returns an array (n, n), int8, of 0 to `HIGHEST`.
+    Rows are along y, columns along x; the robot is in the middle.
     """
     is_robot = np.hypot(CENTERS_M, CENTERS_M[:, np.newaxis]) < robot_radius_m
     excesses = np.zeros(is_robot.shape)

@@ -11,8 +11,8 @@ BEHIND_M = 0.05  # smallest depth that is projected
 
 
 def cylinders_of(tracks, ahead_s, margin_m):
-    """Upright cylinders (n, 5) that contain people `ahead_s` seconds after the stamp of their tracks: x, y, radius,
-    lower and upper end.
+    """Upright cylinders (n, 5) that contain people `ahead_s` seconds after their stamp: x, y, radius, lower and upper
+    end.
 
     The radius is that of the body, a margin and the standard deviation of the predicted position.
     """

@@ -8,7 +8,6 @@ from sensor_msgs.msg import PointCloud2
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.conversions.planner_msgs import (detections3d_to_msg, grid_to_msg, objects_to_msg,
                                                 obstacles_to_msg, people_to_msg, points_to_msg)
-from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.planning.cost_grid import CELL_M, HALF_SIZE_M, presence_costs
 from ros_3d_bb.planning.planner_view import footprint_points, in_frame, ring_points
 
@@ -25,8 +24,7 @@ class Output(NamedTuple):
     published again while no new tracks arrive; otherwise positions are those at the stamp of the image. `latest_tf`
     states that the planner applies the latest transform, or drops positions for which tf is older than their stamp: the
     stamp is 0, for which tf2 takes the latest transform. `float32` states that the message stores coordinates as
-    float32. `is_emptied` states that an empty array is published when the tracks are outdated; otherwise nothing is
-    published then.
+    float32. `is_emptied` states that an empty array is published when the tracks are outdated; otherwise nothing is.
     """
 
     topic: str
@@ -47,20 +45,13 @@ OPTIONAL = {
                   float32=True),
     'mpc': Output('~objects', 'derived_object_msgs/ObjectArray', objects_to_msg, 'planner_frame', to_now=True),
     'vision': Output('~detections', 'vision_msgs/Detection3DArray', detections3d_to_msg)}
-NAMES = ['costmap'] + sorted(OPTIONAL)
+NAMES = ('costmap',) + tuple(sorted(OPTIONAL))
 
 
 def outputs_from(params):
-    """Create the list of Output that the parameters (`PlannerBridgeParams`) select.
-
-    Raises ValueError if an output is unknown, or the package that it needs is not installed; the message names it.
-    """
+    """Create the list of Output that the PlannerBridgeParams select. Raises ValueError without one or its package."""
     if not params.outputs:
         raise ValueError('parameter ~outputs is empty; some of %s expected' % ', '.join(NAMES))
-    for name in params.outputs:
-        if name not in NAMES:
-            raise ValueError('parameter ~outputs has %r; did you mean %s? Known: %s'
-                             % (name, nearest_name(str(name), NAMES), ', '.join(NAMES)))
     found = [_optional_output(name, params) for name in OPTIONAL if name in params.outputs]
     return found + (_costmap_outputs(params) if 'costmap' in params.outputs else [])
 

@@ -61,8 +61,7 @@ def _is_usable(track):
 def with_class_widths(tracks, classes):
     """Give elongated objects at least the length of their class (ObjectClasses) as their width.
 
-    A dog that is seen from the front appears narrow. Planners must keep clear of its whole length, whose direction is
-    unknown.
+    A dog that is seen from the front appears narrow. Planners must keep clear of its length in any direction.
     """
     return [track._replace(size_m=np.maximum(track.size_m, [length_m, length_m, 0])) for track, length_m in
             ((track, classes.of(track.label).length) for track in tracks)]

@@ -1,7 +1,6 @@
 """Highest speed at which a robot can stop before it reaches the places where people will be.
 
-Robot frame, metres, radians, seconds. The robot is a disc around the origin of its frame, which moves straight or
-along a circle.
+Robot frame, metres, radians, seconds. The robot is a disc around the origin that moves straight or along a circle.
 """
 import functools
 import math
@@ -56,19 +55,9 @@ def highest_safe_speed(tracks, age_s, robot_from_tracks, velocity, params, pose_
     which the body, the robot and `people_clearance` are added. A person in whose ellipse the robot already stands does
     not keep it from leaving.
 
-    Parameters
-    ----------
-    tracks : list of TrackedObject
-    age_s : float
-        Time since the stamp of the tracks.
-    robot_from_tracks : numpy.ndarray, (4, 4)
-        Latest pose of the frame of the tracks.
-    velocity : sequence of float
-        Of the robot: along x, along y, and angular. Only the path counts, which is that straight ahead without a
-        linear velocity.
-    params : SafeSpeedParams
-    pose_age_s : float, optional
-        Time since that pose, in which the robot has moved on.
+    The stamp of the tracks (TrackedObject) is `age_s` seconds ago; the latest pose of their frame, (4, 4), is that of
+    `pose_age_s` seconds ago, and the robot has moved on since. Of the velocity of the robot, along x, along y and
+    angular, only the path counts, which is that straight ahead without a linear velocity. `params` are SafeSpeedParams.
     """
     speed_mps, robot_m = params.highest_speed, np.linalg.inv(robot_from_tracks)[:3, 3]
     for track in sorted(tracks, key=lambda each: np.linalg.norm(each.position_m - robot_m)):  # the nearest limit most
@@ -91,9 +80,7 @@ def speed_before_corners(corners_m, age_s, velocity, params, corner_params):
 
 
 def limited_velocity(velocity, limit):
-    """Velocity, along x, along y and angular, with at most this speed on the same path. Rotations in place are not
-    limited.
-    """
+    """Velocity, along x, along y and angular, with at most this speed on the same path; rotations in place are kept."""
     speed_mps = math.hypot(*velocity[:2])
     factor = limit / speed_mps if speed_mps > limit else 1.0
     return tuple([factor * part for part in velocity])

@@ -1,4 +1,1 @@
-"""Measurement sessions on disk: read, write, and collect the images and boxes of one stamp.
-
-May import: camera, core, detection, estimation.
-"""
+"""Measurement sessions on disk: read, write, and collect the images and boxes of one stamp."""

@@ -19,7 +19,6 @@ class Burst(object):
         self._left, self._next_s, self._failed_s = 0 if self.is_active else self._count, now_s + self._delay_s, None
 
     def is_due(self, now_s):
-        """Whether a measurement is due."""
         return self.is_active and now_s >= self._next_s
 
     def report(self, now_s, is_stored):

@@ -16,10 +16,10 @@ import numpy as np
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.camera.distortion import PLUMB_BOB
-from ros_3d_bb.core.atomic_file import FILE_NAME
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.estimation.box3d_estimator import level_rotation
 
+FILE_NAME = 'frames.json'
 SAME_PERSON_IOU = 0.3  # low, because a detector may find half of a body; boxes of two people seldom overlap so much
 
 
@@ -147,12 +147,12 @@ def annotated_people(frames):
 
 
 def read_description(folder):
-    """Content of the `frames.json` of a folder as a dictionary, whose fields are not checked. Raises SessionError."""
+    """Content of the `frames.json` of a folder as a dictionary with a list of frames. Raises SessionError."""
     path = os.path.join(str(folder), FILE_NAME)
     try:
         with session_errors(path), open(path, encoding='utf-8') as stream:
             content = json.load(stream)
-            if not isinstance(content, dict):
+            if not isinstance(content, dict) or not isinstance(content.get('frames'), list):
                 raise ValueError('an object with frames expected')
             return content
     except OSError as error:
@@ -200,10 +200,7 @@ def frame_of(folder, entry):
 
 
 def read_color(frame, camera):
-    """Read the colour image of a frame, (height, width, 3), uint8, RGB, of any size if `camera` is None.
-
-    Raises SessionError.
-    """
+    """Read the colour image of a frame, RGB (h, w, 3), uint8, of any size if `camera` is None. Raises SessionError."""
     image = read_image(frame.color_path, camera)
     if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
         raise SessionError('%s: 8-bit colour image expected' % frame.color_path)

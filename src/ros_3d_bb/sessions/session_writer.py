@@ -4,6 +4,8 @@ Images are written before frames.json, so that frames.json never refers to a mis
 in the file and in metres here.
 """
 import contextlib
+import fcntl
+import json
 import os
 import re
 
@@ -11,9 +13,9 @@ import cv2
 import numpy as np
 
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.core.atomic_file import FILE_NAME, atomic_write, locked_update
+from ros_3d_bb.core.atomic_file import atomic_write
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.sessions.session_reader import read_session
+from ros_3d_bb.sessions.session_reader import FILE_NAME, read_description, read_session
 
 MILLIMETRE = 0.001
 MAX_DEPTH_MM = 65535  # largest value in 16 bits
@@ -73,6 +75,23 @@ def remove(folder, name):
     for kind in ('color', 'depth'):  # afterwards: frames.json never refers to a missing image
         with contextlib.suppress(OSError):
             os.unlink(os.path.join(folder, entry[kind]))
+
+
+@contextlib.contextmanager
+def locked_update(folder):
+    """Lock the description of a session in an existing folder, and write it when the block ends without an error.
+
+    Other programs wait for the lock, so that the viewer can add measurements to a session that is being annotated.
+    Yields the content of frames.json, a dict to be modified in place; {'frames': []} if the file does not exist. Raises
+    OSError if the folder cannot be read or written, and ValueError if frames.json is not the description of a session,
+    or the new content has nan or inf.
+    """
+    path = os.path.join(str(folder), FILE_NAME)
+    with open(os.path.join(str(folder), '.lock'), 'a') as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        content = read_description(folder) if os.path.exists(path) else {'frames': []}
+        yield content
+        atomic_write(path, _text_of(content).encode())
 
 
 def stored_depth(depth):
@@ -147,3 +166,11 @@ def _png(pixels):
     if not is_encoded:
         raise ValueError('an image of type %s and shape %s cannot be written as PNG' % (pixels.dtype, pixels.shape))
     return data.tobytes()
+
+
+def _text_of(content):
+    """Format a description with one line per field and frame: readable, and faster than an indented dump."""
+    frames = ',\n'.join(' ' + json.dumps(frame, allow_nan=False) for frame in content['frames'])
+    fields = ['%s: %s' % (json.dumps(str(key)), json.dumps(value, allow_nan=False))
+              for key, value in content.items() if key != 'frames']
+    return '{\n%s\n}\n' % ',\n'.join(fields + ['"frames": [\n%s\n]' % frames])

@@ -35,8 +35,8 @@ class Snapshot(NamedTuple):
 class Snapshots(object):
     """Combines messages of five topics, which may arrive in any order, to snapshots.
 
-    `add_depth`, `add_camera`, `add_boxes2d` and `add_boxes3d` are called with stamp, arrival time and value, as
-    `add_color`. 2D boxes have the stamp of the colour image, and 3D boxes that of the depth image. Depth and camera
+    `add_color`, `add_depth`, `add_camera`, `add_boxes2d` and `add_boxes3d` are called with stamp, arrival time and
+    value. 2D boxes have the stamp of the colour image, and 3D boxes that of the depth image. Depth and camera
     are matched as in `StampSynchronizer`. If time jumps back, older messages are dropped.
 
     Images are kept for `length_ns` until their boxes arrive. The stamps of colour and depth image differ by at most
@@ -46,17 +46,12 @@ class Snapshots(object):
     def __init__(self, length_ns, tolerance_ns, on_lost):
         self._length_ns = length_ns
         self._sync = StampSynchronizer(length_ns, tolerance_ns, 0, self._on_frame, self._on_lost_color)
-        self._report_lost = on_lost
+        self._on_lost = on_lost
         self._images, self._boxes2d, self._boxes3d = (MessageCache(length_ns) for _part in range(3))
-        self.add_camera = self._sync.add_camera
+        self.add_color, self.add_depth, self.add_camera = (
+            self._sync.add_boxes, self._sync.add_depth, self._sync.add_camera)
         self.add_boxes2d, self.add_boxes3d = self._boxes2d.add, self._boxes3d.add
         self._first_ns = None
-
-    def add_color(self, stamp_ns, now_ns, color):
-        self._sync.add_boxes(stamp_ns, now_ns, (stamp_ns, color))
-
-    def add_depth(self, stamp_ns, now_ns, depth):
-        self._sync.add_depth(stamp_ns, now_ns, (stamp_ns, depth))
 
     @property
     def newest(self):
@@ -72,19 +67,18 @@ class Snapshots(object):
         """Whether boxes may be missing because images have been arriving for less than `length_ns`."""
         return self._first_ns is None or self._images.newest_ns - self._first_ns < self._length_ns
 
-    def _on_frame(self, stamped_color, stamped_depth, camera):
-        (stamp_ns, color), (depth_stamp_ns, depth) = stamped_color, stamped_depth
-        images = depth_stamp_ns, color, depth, camera
-        went_back = self._images.add(stamp_ns, 0, images)  # the arrival time is not used
+    def _on_frame(self, color, depth, camera):
+        images = depth.stamp_ns, color.value, depth.value, camera
+        went_back = self._images.add(color.stamp_ns, color.arrival_ns, images)
         if went_back:
             self._boxes2d.clear()
             self._boxes3d.clear()
         if went_back or self._first_ns is None:
-            self._first_ns = stamp_ns
+            self._first_ns = color.stamp_ns
 
-    def _on_lost_color(self, stamped_color, of_time_before):
+    def _on_lost_color(self, color, of_time_before):
         if not of_time_before:
-            self._report_lost(stamped_color[0])
+            self._on_lost(color.stamp_ns)
 
 
 def _value_at(cache, stamp_ns):

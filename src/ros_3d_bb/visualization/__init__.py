@@ -1,4 +1,1 @@
-"""Markers for RViz, overlays on images, and the window of the viewer.
-
-May import: camera, core, estimation, tracking.
-"""
+"""Markers for RViz, overlays on images, and the window of the viewer."""

@@ -50,9 +50,7 @@ def draw_samples(image, rect_px, samples):
 
 
 def depth_to_grey(depth, farthest_m):
-    """Convert a depth image to grey levels (height, width), uint8.
-
-    Depth from 0 to `farthest_m` is mapped to 255 to 1; 0 means no depth.
+    """Convert a depth image to grey levels (h, w), uint8: 255 to 1 for depth from 0 to `farthest_m`, 0 without depth.
     """
     depth_m = depth.values.astype(np.float32) * np.float32(depth.scale_m)
     with np.errstate(invalid='ignore'):  # nan

@@ -1,4 +1,1 @@
-"""Modules shared by the nodes: parameters, subscribers, tf lookup, diagnostics, reconfigure, ROS master.
-
-May import: camera, conversions, core, diagnosis, msg, pipeline, visualization.
-"""
+"""Modules shared by the nodes: parameters, subscribers, tf lookup, diagnostics, reconfigure, ROS master."""

@@ -18,8 +18,7 @@ class DetectorWorker(object):
     """Detect objects in the newest images, and publish them for bbox3d_node and as an annotated image.
 
     `params` has `enabled` and `publish_empty`. `detect(*images)` is called in a thread of its own. It returns the RGB
-    image and its Detections, or None if there is no result; `names` are the names of the classes. `part` is the Part of
-    the detector node.
+    image and its Detections, or None if there is no result; `names` are those of the classes, `part` is the node's.
 
     Publishes
     ---------

@@ -3,9 +3,8 @@ import collections
 import threading
 import time
 
-import diagnostic_updater
 import rospy
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rospy.topics import get_topic_manager
 from std_msgs.msg import Header
 
@@ -49,9 +48,8 @@ class Diagnostics(EventCounter):
             self._shown.append(inputs.values)
             self._checks.append(inputs.faults)
         self._place_of = launch_places([part.node_name.rpartition('/')[2]])
-        self._updater = NodeUpdater(part.node_name)
-        self._updater.setHardwareID('none')
-        self._updater.add('pipeline', self._report)
+        self._status_name = '%s: pipeline' % part.node_name.lstrip('/')
+        self._publisher = rospy.Publisher('/diagnostics', DiagnosticArray, queue_size=10)
         threading.Thread(target=self._run, daemon=True).start()
 
     def note(self, event, sentence):
@@ -78,24 +76,24 @@ class Diagnostics(EventCounter):
         """Whether an exception results from shutdown, when rospy closes publishers during running callbacks."""
         return isinstance(error, rospy.ROSException) and is_ending()
 
-    def _report(self, status):
+    def _report(self):
+        """Publish the status of the node."""
         is_recent = time.monotonic() - self._warned_at < WARNING_LASTS_S
         faults = self._current_faults()
         self._log_missing_subscribers()
         if is_recent:
-            status.summary(DiagnosticStatus.WARN, self._warning)
+            level, sentence = DiagnosticStatus.WARN, self._warning
         elif faults:
-            status.summary(DiagnosticStatus.WARN, faults[0])
+            level, sentence = DiagnosticStatus.WARN, faults[0]
         elif not self.counts:
-            status.summary(DiagnosticStatus.STALE, 'no input yet')
+            level, sentence = DiagnosticStatus.STALE, 'no input yet'
         else:
-            status.summary(DiagnosticStatus.OK, 'working')
-        for name, amount in self.totals().items():
-            status.add(name, str(amount))
+            level, sentence = DiagnosticStatus.OK, 'working'
+        entries = [KeyValue(name, str(amount)) for name, amount in self.totals().items()]
         for values in [self._rate_and_latency] + self._shown:
-            for name, text in values():
-                status.add(name, text)
-        return status
+            entries += [KeyValue(name, text) for name, text in values()]
+        status = DiagnosticStatus(level, self._status_name, sentence, 'none', entries)
+        self._publisher.publish(DiagnosticArray(header=Header(stamp=rospy.get_rostime()), status=[status]))
 
     def _current_faults(self):
         """Return the sentences about current faults. Each is logged when it first occurs and then every REMINDER_S."""
@@ -134,27 +132,12 @@ class Diagnostics(EventCounter):
     def _run(self):
         while not rospy.is_shutdown():
             try:
-                self._updater.force_update()
+                self._report()
             except Exception as error:  # a failed report must not end the thread
                 if not is_ending():
                     self._log('no report', 'the report on /diagnostics failed (%r); trying again' % error,
                               WARNING_LASTS_S)
             time.sleep(PERIOD_S)
-
-
-class NodeUpdater(diagnostic_updater.Updater):
-    """Publishes statuses under the name of a node, which may be one of several in the process."""
-
-    def __init__(self, node_name):
-        super(NodeUpdater, self).__init__()
-        self._node_name = node_name.lstrip('/')
-
-    def publish(self, statuses):
-        """Publish a list of statuses, or one."""
-        statuses = statuses if isinstance(statuses, list) else [statuses]
-        for status in statuses:
-            status.name = '%s: %s' % (self._node_name, status.name)
-        self.publisher.publish(DiagnosticArray(header=Header(stamp=rospy.get_rostime()), status=statuses))
 
 
 def unsubscribed_results():

@@ -8,15 +8,15 @@ from genpy.message import get_message_class
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo
 
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, info_topic_beside, topic_of
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, RAW, info_topic_beside, topic_of
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC
 from ros_3d_bb.diagnosis.checks import BOXES3D, COLOR, DEPTH, ROLES
 from ros_3d_bb.diagnosis.message_observer import EdgeObserver, Observation, observations_of
 from ros_3d_bb.nodes.common.master import published_topics, publishers_of
 from ros_3d_bb.nodes.common.subscribers import IMAGE_BUFFER
-from ros_3d_bb.pipeline.depth_registration import RAW
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from ros_3d_bb.pipeline.tracking_stage import TrackerNodeParams
+from ros_3d_bb.pipeline.transform_buffer import TransformBuffer
 
 NAMES_S = 1.5  # nodes publish the names of their topics once per second
 OURS = ': pipeline'  # suffix of the diagnostics of the nodes of this package
@@ -32,8 +32,8 @@ class GraphObserver(object):
     def __init__(self, target_frame='', camera=''):
         self._target_frame, self._camera = target_frame, camera
         self._statuses, self._clocks = {}, []
-        self._buffer = tf2_ros.Buffer(debug=False)
-        self._listener = tf2_ros.TransformListener(self._buffer)
+        self._transforms = TransformBuffer()
+        self._listener = tf2_ros.TransformListener(self._transforms)
         self._subscribers = [rospy.Subscriber('/diagnostics', DiagnosticArray, self._on_diagnostics),
                              rospy.Subscriber('/clock', Clock, self._clocks.append, queue_size=10)]
         time.sleep(NAMES_S)
@@ -63,9 +63,8 @@ class GraphObserver(object):
         camera_frame = tracker_param('camera_frame') or (
             boxes3d.header.frame_id if boxes3d is not None else self._bbox3d_param('frame_id'))
         return observations_of(
-            self._observed, self._depth_info, self._topics, time.monotonic() - self._began_s, self._publishers_of,
-            tf=self._observed[DEPTH].tf_seen(self._buffer.lookup_transform, self._buffer.all_frames_as_yaml,
-                                             target_frame, camera_frame),
+            self._observed, self._depth_info, self._topics, time.monotonic() - self._began_s, publishers_of,
+            tf=self._observed[DEPTH].tf_seen(self._transforms, target_frame, camera_frame),
             use_sim_time=bool(rospy.get_param('/use_sim_time', False)), clock_count=len(self._clocks),
             nodes={name: status[:2] for name, status in list(self._statuses.items())},
             edges_fault=self._edges.fault(), depth_is_raw=self._bbox3d_param('depth') == RAW,
@@ -74,9 +73,6 @@ class GraphObserver(object):
 
     def _bbox3d_param(self, name):
         return _param(topic_of(self._camera, 'bbox3d_node'), name, Bbox3dParams())
-
-    def _publishers_of(self, one):
-        return () if one.newest is not None or one.topic not in self._topics else publishers_of(one.topic)
 
     def _topic_of(self, name):
         """Return the name of a topic of the nodes in this graph."""

@@ -23,23 +23,15 @@ def received_tracks(message, diagnostics):
 
 
 class Tracks(NamedTuple):
-    """Valid tracks of one image; their stamp and frame."""
+    """Valid tracks of one image; their stamp and frame; their age in seconds, as `newest` returns them; and the current
+    pose (4, 4) of their frame in that of the robot, as `RobotTracks.around` returns them."""
 
     tracks: list
     stamp_ns: int
     frame_id: str
-
-
-class TracksAround(NamedTuple):
-    """Tracks with at least the widths of their classes (`with_class_widths`), with their stamp and frame, their age in
-    seconds, the latest pose of their frame in that of the robot, (4, 4), and its age in seconds."""
-
-    tracks: list
-    stamp_ns: int
-    frame_id: str
-    age_s: float
-    robot_from_tracks: Any
-    pose_age_s: float
+    age_s: float = 0.0
+    robot_from_tracks: Any = None
+    pose_age_s: float = 0.0
 
 
 class LatestTracks(object):
@@ -53,16 +45,18 @@ class LatestTracks(object):
         Tracks.
     """
 
-    def __init__(self, diagnostics, timeout_s, on_tracks):
+    def __init__(self, diagnostics, timeout_s, on_tracks=lambda _tracks: None):
         self._diagnostics, self._timeout_s, self._on_tracks = diagnostics, timeout_s, on_tracks
         self._newest = None
         subscribe(TRACKS_TOPIC, TrackedObjectArray, self._on_message, 2)
 
     def newest(self):
-        """Return the newest Tracks and their age in seconds; None, 0 if they are too old or the clock went back."""
+        """Return the newest Tracks; None if they are too old or the clock went back."""
         newest = self._newest
-        age_s = 0.0 if newest is None else (rospy.get_rostime().to_nsec() - newest.stamp_ns) / NS
-        return (newest, max(age_s, 0.0)) if newest is not None and abs(age_s) <= self._timeout_s else (None, 0.0)
+        if newest is None:
+            return None
+        age_s = (rospy.get_rostime().to_nsec() - newest.stamp_ns) / NS
+        return newest._replace(age_s=max(age_s, 0.0)) if abs(age_s) <= self._timeout_s else None
 
     def _on_message(self, message):
         with self._diagnostics.receiving('tracks'):
@@ -88,7 +82,7 @@ class RobotTracks(LatestTracks):
         As /tf.
     """
 
-    def __init__(self, diagnostics, params, on_tracks):
+    def __init__(self, diagnostics, params, on_tracks=lambda _tracks: None):
         if not params.robot_frame:
             raise ValueError('parameter ~robot_frame is empty; a frame such as base_link expected')
         self._classes = read_object_classes(params.classes_file)
@@ -97,22 +91,20 @@ class RobotTracks(LatestTracks):
         super(RobotTracks, self).__init__(diagnostics, params.timeout, on_tracks)
 
     def around(self):
-        """Return TracksAround, None if the tracks or the pose are older than the timeout, or the pose is unknown."""
-        newest, age_s = self.newest()
-        if newest is None:
-            return None
-        robot_from_tracks, pose_age_s = self.robot_from(newest.frame_id)
+        """Return the newest Tracks with at least the widths of their classes (`with_class_widths`); None if they or the
+        pose are older than the timeout, or the pose is unknown."""
+        newest = self.newest()
+        robot_from_tracks, pose_age_s = (None, 0.0) if newest is None else self.robot_from(newest.frame_id)
         if robot_from_tracks is None:
             return None
-        tracks = with_class_widths(newest.tracks, self._classes)
-        return TracksAround(tracks, newest.stamp_ns, newest.frame_id, age_s, robot_from_tracks, pose_age_s)
+        return newest._replace(tracks=with_class_widths(newest.tracks, self._classes),
+                               robot_from_tracks=robot_from_tracks, pose_age_s=pose_age_s)
 
     def robot_from(self, frame_id):
         """Return the latest pose of a frame in that of the robot, (4, 4), and its age in seconds; None, 0 if it is
         unknown, or older than the timeout."""
         try:
-            robot_from_frame = self._transforms.latest(self._robot_frame, frame_id)
-            age_s = self._transforms.age_of_latest(self._robot_frame, frame_id)
+            robot_from_frame, age_s = self._transforms.latest(self._robot_frame, frame_id)
         except tf2_ros.TransformException as error:
             self._diagnostics.warn('no transform', 'no transform from %s to %s: %s; waiting for it'
                                    % (frame_id, self._robot_frame, error))

@@ -40,8 +40,7 @@ class _Transport(xmlrpc.client.Transport):
 def patient_master():
     """Return a rosgraph Master with a separate connection, for use in one thread.
 
-    Its methods raise MasterError if the master rejects the request, and another exception of `NO_ANSWER` if it does
-    not respond in time.
+    Its methods raise MasterError if the master rejects the request, another of `NO_ANSWER` if it does not respond.
     """
     master = Master(rospy.get_name())
     master.handle = xmlrpc.client.ServerProxy(master.master_uri, transport=_Transport())

@@ -45,9 +45,7 @@ def launch_places(nodes):
 
 
 def run_node(name, node_class, run=lambda _node: rospy.spin(), parts=()):
-    """Create a node, `run` it (by default until ROS shuts down) and return it.
-
-    `parts` are the names of the nodes that it consists of, if any.
+    """Create a node (of `parts`, names of nodes, if any), `run` it (by default until ROS shuts down) and return it.
 
     A ValueError of the constructor is a configuration error: it is logged, and the exit status is 1.
     """
@@ -64,10 +62,7 @@ def run_node(name, node_class, run=lambda _node: rospy.spin(), parts=()):
 
 
 def wait_for_subscribers(publisher, wanted, meanwhile):
-    """Wait until a publisher has `wanted` subscribers, and call `meanwhile` repeatedly.
-
-    Raises RuntimeError if there are fewer after LONGEST_WAIT_S.
-    """
+    """Call `meanwhile` until a publisher has `wanted` subscribers. Raises RuntimeError after LONGEST_WAIT_S."""
     began_s = time.monotonic()
     while publisher.get_num_connections() < wanted and not rospy.is_shutdown():
         if time.monotonic() - began_s > LONGEST_WAIT_S:

@@ -47,6 +47,14 @@ class Input(object):
         for callback in list(self.callbacks):
             callback(message)
 
+    def remove(self, callback):
+        """Remove a callback; the last one unsubscribes from the topic."""
+        with _lock:
+            self.callbacks.remove(callback)
+            is_last = not self.callbacks
+        if is_last:
+            self.subscriber.unregister()
+
     def stream(self):
         """Return the statistics as a Stream. Lags are unknown without a stamp, and before the first /clock message."""
         stamp, ros_time, machine_s = self._newest or (None, None, None)
@@ -57,7 +65,7 @@ class Input(object):
 
 
 def subscribe(topic, kind, callback, at_once=AT_ONCE):
-    """Subscribe with TCP_NODELAY to a topic whose messages are recorded, see `inputs`. Returns a Subscription.
+    """Subscribe with TCP_NODELAY to a topic whose messages are recorded, see `inputs`. Returns a function that ends it.
 
     Without TCP_NODELAY, the kernel delays small messages by up to 40 ms, until previous ones are acknowledged. With
     the kind Image, each publisher may send any of `camera_msgs.IMAGE_KINDS`, and the callback receives that type. A
@@ -68,29 +76,14 @@ def subscribe(topic, kind, callback, at_once=AT_ONCE):
         shared = next((each for each in _inputs if each.callbacks and each.subscriber.resolved_name == name), None)
         if shared is not None:
             shared.callbacks.append(callback)
-            return Subscription(shared, callback)
+            return lambda: shared.remove(callback)
         created = Input(topic, kind)
         created.callbacks.append(callback)
     created.subscriber = rospy.Subscriber(topic, rospy.AnyMsg if is_image else kind, created.take, queue_size=at_once,
                                           tcp_nodelay=True, buff_size=IMAGE_BUFFER if is_image else SMALL_BUFFER)
     with _lock:
         _inputs.append(created)
-    return Subscription(created, callback)
-
-
-class Subscription(object):
-    """One callback of an Input."""
-
-    def __init__(self, of_input, callback):
-        self._input, self._callback = of_input, callback
-
-    def unregister(self):
-        """Remove the callback; the last one unsubscribes from the topic."""
-        with _lock:
-            self._input.callbacks.remove(self._callback)
-            is_last = not self._input.callbacks
-        if is_last:
-            self._input.subscriber.unregister()
+    return lambda: created.remove(callback)
 
 
 def subscribe_camera_info(topic, image_topic, callback, at_once=KEPT_AT_ONCE):

@@ -22,11 +22,9 @@ class _Listener(tf2_ros.TransformListener):
         tf2_ros.TransformListener.__init__(self, buffer, tcp_nodelay=True)
 
     def callback(self, data):
-        """Process a message of /tf."""
         self._add(tf2_ros.TransformListener.callback, data)
 
     def static_callback(self, data):
-        """Process a message of /tf_static."""
         self._add(tf2_ros.TransformListener.static_callback, data)
 
     def _add(self, add, data):
@@ -41,12 +39,15 @@ class _Listener(tf2_ros.TransformListener):
 
 
 class Transforms(object):
-    """tf2 lookup with a timeout in wall-clock time, so that a stopped /clock cannot block the node."""
+    """tf2 lookup with a timeout in wall-clock time, so that a stopped /clock cannot block the node.
+
+    Attribute `buffer`: the TransformBuffer.
+    """
 
     def __init__(self, wait_s):
         self._wait_s = wait_s
-        self._buffer = TransformBuffer()
-        self._listener = _Listener(self._buffer)
+        self.buffer = TransformBuffer()
+        self._listener = _Listener(self.buffer)
         self._requested, self._explanations = {}, {}  # by (target, source): time; (sentence, time)
 
     def lookup(self, target_frame, source_frame, stamp):
@@ -61,7 +62,7 @@ class Transforms(object):
         with self._listener.news:
             while True:
                 try:
-                    return self._buffer.lookup(*frames, stamp)
+                    return self.buffer.lookup(*frames, stamp)
                 except tf2_ros.TransformException as error:
                     left_s, fault = deadline_s - time.monotonic(), error
                 if left_s <= 0 or rospy.is_shutdown():
@@ -70,20 +71,14 @@ class Transforms(object):
         raise type(fault)(self._explanation(frames, stamp) or str(fault))
 
     def latest(self, target_frame, source_frame):
-        """As `lookup` of the latest transform, which is that received last after a jump in time, too."""
-        self._buffer.forget_later(target_frame, source_frame)
-        return self.lookup(target_frame, source_frame, rospy.Time())
-
-    def age_of_latest(self, target_frame, source_frame):
-        """Age of what `latest` returns, seconds; 0 if only static transforms are between the frames. Raises
-        tf2_ros.TransformException."""
-        frames = target_frame.lstrip('/'), source_frame.lstrip('/')
-        newest = self._buffer.get_latest_common_time(*frames)
-        return max((rospy.get_rostime() - newest).to_sec(), 0.0) if newest and frames[0] != frames[1] else 0.0
-
-    def link_to_root(self, target_frame, frame, target_from_frame):
-        """As `TransformBuffer.link_to_root`."""
-        return self._buffer.link_to_root(target_frame, frame, target_from_frame)
+        """Look up the latest transform, which is that received last after a jump in time, too. Returns it, as `lookup`,
+        and its age in seconds, 0 if only static transforms are between the frames."""
+        target, source = target_frame.lstrip('/'), source_frame.lstrip('/')
+        self.buffer.forget_later(target, source)
+        target_from_source = self.lookup(target, source, rospy.Time())
+        newest = self.buffer.get_latest_common_time(target, source)
+        is_static = not newest or target == source
+        return target_from_source, 0.0 if is_static else max((rospy.get_rostime() - newest).to_sec(), 0.0)
 
     def close(self):
         """Unsubscribe from tf."""
@@ -101,7 +96,7 @@ class Transforms(object):
 
     def _age_of(self, target_frame, source_frame):
         try:
-            newest = self._buffer.get_latest_common_time(target_frame, source_frame)
+            newest = self.buffer.get_latest_common_time(target_frame, source_frame)
         except tf2_ros.TransformException:
             return 'none'
         return '%.3f s' % (rospy.get_rostime() - newest).to_sec() if newest else 'static'
@@ -114,7 +109,7 @@ class Transforms(object):
         now_s = time.monotonic()
         recent = {key: entry for key, entry in list(self._explanations.items()) if now_s - entry[1] < EXPLAINED_S}
         if frames not in recent:
-            links = links_in(self._buffer.all_frames_as_yaml())
+            links = links_in(self.buffer.all_frames_as_yaml())
             recent[frames] = why_missing(links, *frames, stamp_s=stamp.to_sec())[0], now_s
         self._explanations = recent
         return recent[frames][0]
