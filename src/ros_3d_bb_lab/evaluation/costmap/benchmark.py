@@ -196,6 +196,5 @@ def running_nodes(launch):
 
 
 def add_options(parser):
-    """Add the options of the command."""
     parser.add_argument('--weights', help='checkpoint or export of YOLOv5; without it, people are detected in depth')
     add_scenarios(parser, *SCENES)

@@ -96,5 +96,4 @@ def run(arguments):
 
 
 def add_options(parser):
-    """Add the options of the command."""
     add_scenarios(parser, *SCENES)
