@@ -14,27 +14,23 @@ ros_modules=(
   tf2_ros visualization_msgs)
 debian_python=/usr/lib/python3/dist-packages
 
-use_platform() {  # NAME [PYTHON]
+use_platform() {  # NAME
   local version=${platform_python[${1:-none}]:-}
   [ -n "$version" ] || fail "test --platform '$1' is unknown; one of bullseye ${!platform_python[*]} expected"
   platform=$1 venv=$cache/$1 workspace=$workspace-$1
-  if [ $# -gt 1 ]; then
-    is_python "$2" "$version" || fail "--python: '$2' is not Python $version, the version of $1"
-    python=$2
-  elif ! python=$(find_python "$version"); then
-    say "no Python $version for $1 on this machine: install one ('pyenv install $version'), or name it by --python PATH"
+  if ! python=$(find_python "$version"); then
+    say "no Python $version for $1 on this machine: install one ('pyenv install $version')"
     exit 77  # nothing was tested
   fi
-}
-
-is_python() {  # PATH VERSION
-  [ "$("$1" -c 'import ensurepip, sys; print("%d.%d" % sys.version_info[:2])' 2> /dev/null)" = "$2" ]
 }
 
 find_python() {  # VERSION
   local found
   for found in "python$1" "$(pyenv root 2> /dev/null)/versions/$1".*/bin/python; do
-    if is_python "$found" "$1"; then echo "$found"; return; fi
+    if [ "$("$found" -c 'import ensurepip, sys; print("%d.%d" % sys.version_info[:2])' 2> /dev/null)" = "$1" ]; then
+      echo "$found"
+      return
+    fi
   done
   return 1
 }

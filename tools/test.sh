@@ -38,22 +38,15 @@ run_all_tests() {
   return $status
 }
 
-test_on_platform() {  # NAME [--python PATH] [--fast | -k EXPR | PATH ...]
+test_on_platform() {  # NAME [--fast | -k EXPR | PATH ...]
   local name=${1:-}
   [ $# -eq 0 ] || shift
   if [ "$name" = bullseye ]; then
-    [ "${1:-}" != --python ] || fail "--python does not apply to bullseye, which has Python 3.9: '${2:-}'"
     set_up_root
     in_root "$here/run" test "$@"
     return
   fi
-  if [ "${1:-}" = --python ]; then
-    [ $# -gt 1 ] || fail "--python needs the path of a Python"
-    use_platform "$name" "$2"
-    shift 2
-  else
-    use_platform "$name"
-  fi
+  use_platform "$name"
   pytest_options=(--leave-out)
   case ${1:-} in
     ''|--fast) run_tests "$@" ;;

@@ -89,7 +89,7 @@ def test_time_and_tf_are_published_every_20_ms_and_at_the_images(tmp_path):
     with contextlib.ExitStack() as stack:
         recorders = {topic: stack.enter_context(Recorder(topic, kind, publisher_expected=False))
                      for topic, kind in TOPICS.items()}
-        process = started('simulator_node', 'publish_clock:=true', 'repeat:=false', 'wait_for_subscribers:=1',
+        process = started('simulator_node', 'repeat:=false', 'wait_for_subscribers:=1',
                           'scenario:=%s' % (tmp_path / 'scene.yaml'))
         wait_until(lambda: all(recorder.is_connected for recorder in recorders.values()), 'all connections')
         recorders[COLOR] = stack.enter_context(Recorder(COLOR, Image))  # the subscriber that the node waits for
@@ -110,8 +110,7 @@ def test_time_and_tf_are_published_every_20_ms_and_at_the_images(tmp_path):
 
 
 @pytest.mark.parametrize('params, reason', [
-    ((), 'no scenario given'), (('scenario:=/nowhere.yaml',), '/nowhere.yaml'),
-    (('scenario:=x', 'supervised:=true'), 'publish_clock')])
+    ((), 'no scenario given'), (('scenario:=/nowhere.yaml',), '/nowhere.yaml')])
 def test_invalid_parameters_are_rejected_at_the_start(params, reason):
     output, _none = started('simulator_node', *params).communicate(timeout=30)
     assert reason in output and 'Traceback' not in output

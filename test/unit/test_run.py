@@ -22,8 +22,6 @@ def test_help_starts_nothing(arguments):
 
 @pytest.mark.parametrize('arguments', [
     ('tset',), ('test', '--quick'), ('test', '--fast', 'x'), ('test', '--platform'), ('test', '--platform', 'kinetic'),
-    ('test', '--platform', 'noetic', '--python'), ('test', '--platform', 'noetic', '--python', '/bin/false'),
-    ('test', '--platform', 'bullseye', '--python', '/bin/false'),
     ('test', 'missing.py'), ('test', '-k'), ('build', 'x'), ('setup', 'x'), ('lint', '--all'),
     ('demo', '--fast'), ('demo', 'missing'), ('demo', 'rate:=fast'), ('demo', 'weights:=missing.pt')])
 def test_unknown_arguments_are_errors(arguments):

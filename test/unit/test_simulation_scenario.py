@@ -63,11 +63,10 @@ def test_values_are_read_into_their_attributes():
         'duration': 3, 'rate': 10, 'seed': 2 ** 32 - 1, 'depth_noise': False, 'color_noise': 0,
         'room': {'bounds': [-5, 5, -6, 6], 'height': 3, 'furniture': [{'at': [1, 2], 'size': [1, 1, 2], 'yaw': .5}]},
         'robot': {'pose': [0, 1, 2], 'moves': [{'turn': -1}], 'pitch': .1},
-        'people': [{'start': [3, 3], 'repeat': True, 'long_hair': True, 'shirt': [1, 2, 3],
+        'people': [{'start': [3, 3], 'repeat': True,
                     'moves': [{'to': [4, 3], 'speed': 1}, {'wait': 1, 'facing': 2, 'crouch': .5}]}]})
     assert scenario == Scenario(
         3.0, 10.0, 2 ** 32 - 1, False, 0.0, Room((-5, 5, -6, 6), 3.0, (Furniture((1, 2), (1, 1, 2), .5),)),
         Robot((0, 1, 2), (Move(turn=-1.0),), pitch=.1),
-        (Person((3, 3), moves=(Move(to=(4, 3), speed=1.0), Move(wait=1.0, facing=2.0, crouch=.5)), repeat=True,
-                long_hair=True, shirt=(1, 2, 3)),))
+        (Person((3, 3), moves=(Move(to=(4, 3), speed=1.0), Move(wait=1.0, facing=2.0, crouch=.5)), repeat=True),))
     assert isinstance(scenario.seed, int) and isinstance(scenario.duration, float)

@@ -97,12 +97,6 @@ def test_arguments_set_parameters_nodes_and_topics(command, expected):
     assert {key: found.get(key) for key in expected} == expected
 
 
-def test_a_measurement_is_recorded_with_the_topics_of_the_camera():
-    _parameters, nodes = loaded(*shlex.split(MEASURE + 'camera_depth:=a/depth record:="/some where/a.bag"'))
-    assert '/a/depth' in nodes['recorder'].args.split()
-    assert "--output-name '/some where/a.bag'" in nodes['recorder'].args and nodes['viewer_node'].required
-
-
 def test_commands_of_the_container_start_camera_and_pipeline():
     with open(os.path.join(ROOT, 'docker', 'compose.yaml')) as stream:
         services = yaml.safe_load(stream)['services']

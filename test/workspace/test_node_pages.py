@@ -28,8 +28,7 @@ MORE_PARAMS = {'planner_bridge_node': {'outputs': 'costmap, people, teb, mpc, vi
                'realsense_node': {'publish_clock': True}, 'replay_node': {'boxes': True},
                'navigation_trial_node': dict(scenario=SCENARIO, tracks=True, boxes=True, cloud=True, visible=True,
                                              scan=True),
-               'simulator_node': {'scenario': SCENARIO, 'publish_clock': True, 'drive': True, 'boxes': True,
-                                  'supervised': True}}
+               'simulator_node': {'scenario': SCENARIO, 'drive': True, 'boxes': True, 'supervised': True}}
 OTHERS = {'realsense_node': RealSenseNode, 'replay_node': ReplayNode, 'simulator_node': SimulatorNode,
           'latency_probe_node': LatencyProbeNode, 'navigation_trial_node': NavigationTrialNode,
           'people_node': PeopleNode}

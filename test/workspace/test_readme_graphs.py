@@ -17,7 +17,6 @@ SCENE = {'duration': 1.0, 'rate': 5.0, 'people': [{'start': [4.5, 0.3], 'facing'
 PIPELINE = {'/people_node'}
 LOADED = {  # beginning of a block: nodes that it starts
     'roslaunch ros_3d_bb jackal.launch': PIPELINE | {'/planner_bridge_node', '/camera_mount', '/camera_realsense'},
-    'export ROS_MASTER_URI=http://192.168.131.1:11311': {'/rviz'},
     'roslaunch ros_3d_bb pipeline.launch weights:=$HOME/yolov5n.pt\n': PIPELINE,
     'roslaunch ros_3d_bb pipeline.launch weights:=$HOME/yolov5n.pt rviz:=true': PIPELINE | {'/rviz'},
     'roslaunch ros_3d_bb pipeline.launch weights:=$HOME/yolov5n.pt error_model:=': PIPELINE,

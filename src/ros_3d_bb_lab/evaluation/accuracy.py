@@ -166,7 +166,6 @@ def run(arguments):
 
 
 def add_options(parser):
-    """Add the options of the command."""
     parser.add_argument('--data', default=data_folder('thesis'), metavar='DIR',
                         help='a measurement session (default: $ROS_3D_BB_DATA/data/thesis)')
     parser.add_argument('--error-model', metavar='FILE', help='error model for the correction (default: models fitted '

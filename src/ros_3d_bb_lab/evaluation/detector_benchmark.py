@@ -143,7 +143,6 @@ def run(arguments):
 
 
 def add_options(parser):
-    """Add the options of the command."""
     parser.add_argument('--weights', nargs='+', default=list(filter(None, [default_weights()])), metavar='FILE',
                         help='model files: YOLOv5 checkpoints, ONNX files (default: yolov5n.pt in the cache, if any)')
     parser.add_argument('--data', default=data_folder('thesis'), metavar='DIR',

@@ -127,7 +127,6 @@ def run(arguments):
 
 
 def add_options(parser):
-    """Add the options of the command."""
     add_scenarios(parser, 'thesis_*', 'approach_*')
     parser.add_argument('--weights', help='checkpoint or export of YOLOv5; without it, YOLOv5 is not run')
 

@@ -30,32 +30,24 @@ class Step(NamedTuple):
     moment: Moment
 
 
-def detect_in_scene(simulator, detect, every=1, error_model=None):
-    """Render a scene and detect the people in it, image by image.
+def run_scene(simulator, detect, every=1, error_model=None):
+    """Run the pipeline on every `every`-th image of a scene. Returns a list of Step.
 
-    `detect` is called with a SimulatedFrame and returns `boxes.Detections`. Every `every`-th image is used. An error
-    model corrects the 3D boxes and provides their covariance, as in bbox3d_node. Yields a Step without tracks, and the
-    inputs of a tracker: its detections and the CameraView.
+    `detect` is called with a SimulatedFrame and returns `boxes.Detections`. An error model corrects the 3D boxes and
+    provides their covariance, as in bbox3d_node.
     """
+    tracker, steps = Tracker(), []
     for number in range(0, simulator.frame_count, every):
         frame = simulator.frame(number)
         detected = detect(frame)
         depth = DepthImage(frame.depth_mm, 0.001)
         stamp_ns = int(round(frame.time_s * NS))
         people = [track for track in simulator.true_tracks(frame, stamp_ns) if track.label == PERSON]
-        step = Step(frame._replace(color=None, depth_mm=None), detected.boxes, Moment(stamp_ns, people, []))
         detections = detections_in(depth, detected, simulator.camera, frame.poses.map_from_camera, error_model)
         view = CameraView(frame.poses.map_from_camera, simulator.camera, frame.camera,
                           functools.partial(depths_towards, simulator.camera, depth))
-        yield step, detections, view
-
-
-def run_scene(simulator, detect, every=1, error_model=None):
-    """Run the pipeline on a scene: `detect_in_scene`, then our tracker. Returns a list of Step."""
-    tracker, steps = Tracker(), []
-    for step, detections, view in detect_in_scene(simulator, detect, every, error_model):
-        tracks = tracker.update(step.moment.stamp_ns, detections, view)
-        steps.append(step._replace(moment=step.moment._replace(tracks=tracks)))
+        tracks = tracker.update(stamp_ns, detections, view)
+        steps.append(Step(frame._replace(color=None, depth_mm=None), detected.boxes, Moment(stamp_ns, people, tracks)))
     return steps
 
 

@@ -221,7 +221,6 @@ def run(arguments):
 
 
 def add_options(parser):
-    """Add the options of the command."""
     parser.add_argument('--data', default=data_folder('thesis'), metavar='DIR',
                         help='measurement session (default: $ROS_3D_BB_DATA/data/thesis, or simulated)')
     parser.add_argument('--weights', default=default_weights(), metavar='FILE',

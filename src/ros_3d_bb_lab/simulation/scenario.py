@@ -96,7 +96,7 @@ class Robot(NamedTuple):
 
 
 class Person(NamedTuple):
-    """Attributes of the appearance (see `body.Build`) that are None are random by the seed."""
+    """The appearance is random by the seed, and so is the height if it is None."""
 
     start: Point
     facing: float = 0.0
@@ -105,14 +105,6 @@ class Person(NamedTuple):
     repeat: bool = False
     gives_way: bool = False
     height: Optional[float] = None
-    girth: Optional[float] = None
-    hips: Optional[float] = None
-    long_hair: Optional[bool] = None
-    short_sleeves: Optional[bool] = None
-    skin: Optional[Color] = None
-    hair: Optional[Color] = None
-    shirt: Optional[Color] = None
-    trousers: Optional[Color] = None
 
 
 class SceneObject(NamedTuple):
@@ -151,8 +143,8 @@ MOVE_KEYS = {'to': ('to', 'speed', 'rate'), 'turn': ('turn', 'rate'), 'wait': ('
 RECORDS = {'room': Room, 'robot': Robot, 'follow': Follow, 'drive': Drive}
 LISTS = {'furniture': Furniture, 'people': Person, 'objects': SceneObject, 'moves': Move, 'cameras': Mount}
 VECTORS = {'bounds': 4, 'at': 2, 'size': 3, 'to': 2, 'start': 2, 'pose': 3, 'mount': 3, 'odometry_drift': 3,
-           'footprint': 2, 'odometry_error': 2, 'color': 3, 'skin': 3, 'hair': 3, 'shirt': 3, 'trousers': 3}
-FLAGS = {'repeat', 'gives_way', 'long_hair', 'short_sleeves', 'depth_noise'}
+           'footprint': 2, 'odometry_error': 2, 'color': 3}
+FLAGS = {'repeat', 'gives_way', 'depth_noise'}
 WHOLE = {'seed', 'person', 'pushed_by'}
 NAME = re.compile(r'[A-Za-z]\w*$')  # a topic namespace
 TYPES = (  # keys, check of a value, and its description
@@ -162,13 +154,13 @@ TYPES = (  # keys, check of a value, and its description
     ({'label'}, lambda value: isinstance(value, str) and not label_fault(value), 'the name of a class such as dog'))
 RANGES = (  # the same for numbers
     (WHOLE, lambda number: number == int(number) and 0 <= number < 2 ** 32, 'an integer from 0 to 4294967295'),
-    ({'duration', 'rate', 'height', 'speed', 'girth', 'distance', 'size', 'footprint', 'acceleration',
-      'angular_acceleration'}, lambda number: number > 0, 'more than 0'),
+    ({'duration', 'rate', 'height', 'speed', 'distance', 'size', 'footprint', 'acceleration', 'angular_acceleration'},
+     lambda number: number > 0, 'more than 0'),
     ({'odometry_error'}, lambda number: -1 < number < 1, 'more than -1 and less than 1'),
     ({'rate'}, lambda number: number <= 1000, 'at most 1000'),
     ({'wait', 'color_noise', 'above'}, lambda number: number >= 0, 'at least 0'),
-    ({'crouch', 'hips'}, lambda number: 0 <= number <= 1, '0 to 1'),
-    ({'color', 'skin', 'hair', 'shirt', 'trousers'}, lambda number: 0 <= number <= 255, '0 to 255'))
+    ({'crouch'}, lambda number: 0 <= number <= 1, '0 to 1'),
+    ({'color'}, lambda number: 0 <= number <= 255, '0 to 255'))
 
 
 def read_scenario(path):

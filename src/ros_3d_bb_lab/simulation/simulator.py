@@ -229,7 +229,7 @@ def upright(x, y, z, yaw):
 
 
 def _build(person, seed, number):
-    """Appearance of a person: random by the seed, except for what the scenario specifies."""
+    """Appearance of a person: random by the seed, except for the height if the scenario specifies it."""
     random = np.random.RandomState([seed, number])
 
     def choice(colors):
@@ -239,8 +239,7 @@ def _build(person, seed, number):
     build = Build(random.uniform(1.58, 1.92), random.uniform(.95, 1.25), float(random.randint(2)),
                   bool(random.randint(2)), bool(random.randint(2)), choice(SKINS), choice(HAIRS),
                   SHIRTS[shirts[number % len(SHIRTS)]], choice(TROUSERS), choice(SHOES))
-    specified = dict(person._asdict(), height_m=person.height)
-    return build._replace(**{name: specified[name] for name in Build._fields if specified.get(name) is not None})
+    return build if person.height is None else build._replace(height_m=person.height)
 
 
 def jittered_boxes(frame, camera, seed):

@@ -122,6 +122,10 @@ class Player(object):
                 self._tracks_pub.publish(tracks_to_msg(step.moment.tracks, header))
         return self.costmaps_of(scene, self._grids)
 
+    def score(self, scene, costmaps):
+        """Score the costmaps of a scene, see `score_costmaps`."""
+        return score_costmaps(costmaps, sightings_of(scene), scene.simulator.positions_at)
+
     def costmaps_of(self, scene, grids):
         """Convert the OccupancyGrids since the start of the scene to Costmaps."""
         return [_costmap(scene, grid, self.start_ns) for grid in grids
@@ -158,29 +162,29 @@ def _costmap(scene, grid, start_ns):
                    scene.simulator.poses_at(seconds).map_from_odom)
 
 
-def result_of(scene, costmaps):
-    """Score the costmaps of a scene, see `score_costmaps`."""
-    return score_costmaps(costmaps, sightings_of(scene), scene.simulator.positions_at)
-
-
-def run(arguments):
-    """Score the costmaps of each scene."""
+def play_scenes(paths, launch, make_player, yolov5=None):
+    """Score the costmaps of each scenario, in a file, with the nodes of a launch file and the Player that is made."""
     print(describe_machine(), flush=True)
-    yolov5 = yolov5_detector(arguments.weights) if arguments.weights else None
-    scenes = [tracked_scene(path, yolov5) for path in arguments.scenarios]
+    scenes = [tracked_scene(path, yolov5) for path in paths]
     results = {}
-    with running_nodes():
+    with running_nodes(launch):
         rospy.init_node('costmap_benchmark', disable_signals=True)
-        player = Player()
+        player = make_player()
         player.start(scenes[0])
         for scene in scenes:
-            results[scene.name] = result_of(scene, player.play(scene))
+            results[scene.name] = player.score(scene, player.play(scene))
             print(line_of(scene.name, **results[scene.name]), flush=True)
     return {'machine': describe_machine(), 'scenes': results}
 
 
+def run(arguments):
+    """Score the costmaps of each scene."""
+    yolov5 = yolov5_detector(arguments.weights) if arguments.weights else None
+    return play_scenes(arguments.scenarios, LAUNCH, Player, yolov5)
+
+
 @contextlib.contextmanager
-def running_nodes(launch=LAUNCH):
+def running_nodes(launch):
     """Context in which roscore and the nodes of a launch file run on a free port."""
     with tempfile.TemporaryDirectory() as folder:
         path, port = os.path.join(folder, 'costmap.launch'), free_port()
@@ -192,6 +196,5 @@ def running_nodes(launch=LAUNCH):
 
 
 def add_options(parser):
-    """Add the options of the command."""
     parser.add_argument('--weights', help='checkpoint or export of YOLOv5; without it, people are detected in depth')
     add_scenarios(parser, *SCENES)

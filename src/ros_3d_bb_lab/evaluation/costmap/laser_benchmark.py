@@ -9,9 +9,8 @@ from sensor_msgs.msg import LaserScan
 
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb_lab.evaluation.costmap.benchmark import SCENES, Player, running_nodes, tracked_scene
-from ros_3d_bb_lab.evaluation.defaults import add_scenarios, describe_machine
-from ros_3d_bb_lab.evaluation.text_table import line_of
+from ros_3d_bb_lab.evaluation.costmap.benchmark import SCENES, Player, play_scenes
+from ros_3d_bb_lab.evaluation.defaults import add_scenarios
 from ros_3d_bb_lab.simulation.laser import FIELD_OF_VIEW, planar_pose, rectangles_of, scan_ranges
 from ros_3d_bb_lab.simulation.ros.driven_robot import scan_to_msg
 
@@ -51,18 +50,17 @@ def counts_of(costmap, room):
 class LaserPlayer(Player):
     """As Player, with a laser. Before each scene, scans all around without a return clear the costmaps, whose corners
     are within their raytrace_range.
-
-    Attribute `with_people`: the OccupancyGrids of the layer of the scan with people.
     """
 
     def __init__(self):
         super(LaserPlayer, self).__init__()
-        self._scan_pub, self.with_people = rospy.Publisher('scan', LaserScan, queue_size=10), []
+        self._scan_pub, self._with_people = rospy.Publisher('scan', LaserScan, queue_size=10), []
         self._due_ns, self._is_clearing = 0, False
-        rospy.Subscriber('/costmap_with_people/costmap/costmap', OccupancyGrid, self.with_people.append,
+        rospy.Subscriber('/costmap_with_people/costmap/costmap', OccupancyGrid, self._with_people.append,
                          queue_size=100, buff_size=2 ** 24)
 
     def _lead(self, scene):
+        del self._with_people[:]
         self._is_clearing = True
         super(LaserPlayer, self)._lead(scene)
         self._is_clearing = False
@@ -75,6 +73,13 @@ class LaserPlayer(Player):
                                    else scan_message(scene.simulator, seconds, stamp))
         super(LaserPlayer, self)._tick(scene, seconds, with_map, with_odom)
 
+    def score(self, scene, costmaps):
+        """Mean numbers of lethal cells of people and of the room in the costmaps, of both scans."""
+        room, with_people = scene.simulator.scenario.room, self.costmaps_of(scene, self._with_people)
+        means = [np.mean([counts_of(costmap, room) for costmap in each], axis=0) for each in (with_people, costmaps)]
+        return {'costmaps': len(costmaps), 'of_people': means[0][0], 'of_people_static': means[1][0],
+                'of_room': means[0][1], 'of_room_static': means[1][1]}
+
 
 def scan_message(simulator, seconds, stamp):
     """The scan at a time of a scene."""
@@ -85,32 +90,10 @@ def scan_message(simulator, seconds, stamp):
     return scan_to_msg(ranges_m, FIELD_OF_VIEW, stamp)
 
 
-def result_of(scene, costmaps, with_people):
-    """Mean numbers of lethal cells of people and of the room in the costmaps, of both scans."""
-    room = scene.simulator.scenario.room
-    means = [np.mean([counts_of(costmap, room) for costmap in each], axis=0) for each in (with_people, costmaps)]
-    return {'costmaps': len(costmaps), 'of_people': means[0][0], 'of_people_static': means[1][0],
-            'of_room': means[0][1], 'of_room_static': means[1][1]}
-
-
 def run(arguments):
     """Count the cells in the costmaps of each scene."""
-    print(describe_machine(), flush=True)
-    scenes = [tracked_scene(path) for path in arguments.scenarios]
-    results = {}
-    with running_nodes(LAUNCH % ''.join(COSTMAP % item for item in NODES.items())):
-        rospy.init_node('laser_benchmark', disable_signals=True)
-        player = LaserPlayer()
-        player.start(scenes[0])
-        for scene in scenes:
-            del player.with_people[:]
-            costmaps = player.play(scene)
-            with_people = player.costmaps_of(scene, player.with_people)
-            results[scene.name] = result_of(scene, costmaps, with_people)
-            print(line_of(scene.name, **results[scene.name]), flush=True)
-    return {'machine': describe_machine(), 'scenes': results}
+    return play_scenes(arguments.scenarios, LAUNCH % ''.join(COSTMAP % item for item in NODES.items()), LaserPlayer)
 
 
 def add_options(parser):
-    """Add the options of the command."""
     add_scenarios(parser, *SCENES)

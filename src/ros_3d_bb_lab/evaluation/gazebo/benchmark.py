@@ -129,7 +129,6 @@ def run(arguments):
 
 
 def add_options(parser):
-    """Add the options of the command."""
     add_scenarios(parser, 'thesis_*')
     parser.add_argument('--weights', metavar='FILE', help='network of yolov5_node; without it, depth_detector_node')
 

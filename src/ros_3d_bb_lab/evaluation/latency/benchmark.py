@@ -121,7 +121,6 @@ def _cases(arguments):
 
 
 def add_options(parser):
-    """Add the options of the command."""
     parser.add_argument('--cases', help='some of free, depth, yolov5-512, yolov5-640, yolov5-auto and the names of '
                         'further model files, each with or without +load, separated by commas (default: all)')
     parser.add_argument('--seconds', type=in_range(float, 1), default=20.0,

@@ -71,7 +71,6 @@ def run(arguments):
 
 
 def add_options(parser):
-    """Add the options of the command."""
     parser.add_argument('--runs', type=in_range(int, 1), default=20, metavar='N',
                         help='trials per scene and mode (default: 20)')
     parser.add_argument('--seed', type=in_range(int, 0), default=1, metavar='N',

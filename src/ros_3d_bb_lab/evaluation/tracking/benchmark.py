@@ -134,7 +134,6 @@ def _run_at_rates(runs, arguments):
 
 
 def add_options(parser):
-    """Add the options of the command."""
     parser.add_argument('--data', default=data_folder('trajectories'), metavar='DIR',
                         help='folder of CSV files with the columns %s (default: $ROS_3D_BB_DATA/data/trajectories if '
                         'it exists, otherwise generated trajectories)' % ','.join(COLUMNS))

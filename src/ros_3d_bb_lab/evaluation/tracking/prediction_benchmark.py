@@ -179,7 +179,6 @@ def run(arguments):
 
 
 def add_options(parser):
-    """Add the options of the command."""
     parser.add_argument('--data', default=data_folder('vru'), metavar='DIR',
                         help='folder with a folder of CSV files for each kind of motion, with the columns %s (default: '
                         '$ROS_3D_BB_DATA/data/vru if it exists)' % ','.join(COLUMNS))

@@ -41,16 +41,12 @@ class SimulatorParams(NamedTuple):
     seed: int = Param(
         -1, 'Seed of the noise and of the appearance of people, for the same images in every run; -1: that of the '
         'scenario.', limits=(-1, 2 ** 32 - 1))
-    publish_clock: bool = Param(
-        False, 'Whether this node publishes the time on /clock (set /use_sim_time too). Then stamps are the same in '
-        'every run, and time waits if the machine is too slow. Otherwise, stamps are the time of the machine, and late '
-        'images are skipped.')
     drive: bool = Param(False)
     boxes: bool = Param(
         False, 'Whether to publish the true 2D boxes of people in place of a detector, with a jitter of 1 pixel.')
     supervised: bool = Param(
-        False, 'Whether another node controls the time, with ~publish_clock: the scene stands still until the first '
-        'message on ~time_limit, and its time never exceeds the last one.')
+        False, 'Whether another node controls the time: the scene stands still until the first message on ~time_limit, '
+        'and its time never exceeds the last one.')
     repeat: bool = Param(True, 'Whether the scene starts again 3 s after its end. Otherwise, the node exits.')
     wait_for_subscribers: int = WAIT_FOR_SUBSCRIBERS
 
@@ -58,8 +54,8 @@ class SimulatorParams(NamedTuple):
 class SimulatorNode(object):
     """Play a scenario: colour, aligned depth, camera_info, tf from the map to the camera, and ground truth.
 
-    If the node publishes the time (~publish_clock), time waits for images on slow machines; otherwise late images are
-    skipped. Time and tf do not depend on the rate of the images: they are published 50 times per second, and with the
+    The node publishes the time (set /use_sim_time), which waits for images on slow machines: stamps are the same in
+    every run. Time and tf do not depend on the rate of the images: they are published 50 times per second, and with the
     stamp of each image. If there are several cameras, the name of the camera precedes its topics, for example
     front/color/image_raw.
 
@@ -91,7 +87,7 @@ class SimulatorNode(object):
     /tf : tf2_msgs/TFMessage
         From the map to the camera.
     /clock : rosgraph_msgs/Clock
-        Simulated time; only with ~publish_clock.
+        Simulated time.
     odom : nav_msgs/Odometry
         Measured motion, with the errors of robot.drive.odometry_error; only with ~drive.
     collisions : std_msgs/UInt32
@@ -114,9 +110,7 @@ class SimulatorNode(object):
             kinds.update((topic_of(camera, BOXES_TOPIC), Int32MultiArray) for camera in self._simulator.cameras)
         self._pubs = {topic: rospy.Publisher(topic, kind, queue_size=10) for topic, kind in kinds.items()}
         self._tf_pub = rospy.Publisher('/' + TF_TOPIC, TYPES[TF_TOPIC], queue_size=QUEUE_SIZE)
-        self._clock_pub = None
-        if self._params.publish_clock:
-            self._clock_pub = rospy.Publisher('/clock', Clock, queue_size=QUEUE_SIZE)
+        self._clock_pub = rospy.Publisher('/clock', Clock, queue_size=QUEUE_SIZE)
         self._renderer, self._rendering, self._failed = ThreadPoolExecutor(max_workers=1), None, False
         self._robot = DrivenRobot(self._simulator, self._diagnostics) if self._params.drive else None
         self._limit_ns = None
@@ -145,7 +139,7 @@ class SimulatorNode(object):
             # The time is published meanwhile, because rosbag and other nodes subscribe only after it is valid.
             wait_for_subscribers(self._pubs[topic_of(camera, COLOR_TOPIC)], self._params.wait_for_subscribers,
                                  lambda: self._publish_clock(START_NS))
-        start_ns = START_NS + CLOCK_LEAD_NS if self._clock_pub is not None else rospy.get_rostime().to_nsec()
+        start_ns = START_NS + CLOCK_LEAD_NS
         if self._params.supervised:
             start_ns = self._stand_still(start_ns)
         while not rospy.is_shutdown():
@@ -154,11 +148,7 @@ class SimulatorNode(object):
                 rospy.loginfo('the scene is over')
                 time.sleep(SENDING_S)
                 break
-            if self._clock_pub is not None:
-                start_ns += int(self._simulator.scenario.duration * NS) + PAUSE_NS
-            else:
-                time.sleep(PAUSE_NS / NS)
-                start_ns = rospy.get_rostime().to_nsec()
+            start_ns += int(self._simulator.scenario.duration * NS) + PAUSE_NS
 
     def _stand_still(self, start_ns):
         """Publish the start of the scene until the first time limit. Returns the time of the limit."""
@@ -188,8 +178,7 @@ class SimulatorNode(object):
             self._publish_state(state, stamp_ns)
             if number is not None:
                 self._render(number, state, stamp_ns)
-            if self._clock_pub is not None:
-                began_s = max(began_s, time.monotonic() - time_s - CATCH_UP_S)
+            began_s = max(began_s, time.monotonic() - time_s - CATCH_UP_S)
         self._wait_for_image()
 
     def _publish_state(self, state, stamp_ns):
@@ -203,9 +192,6 @@ class SimulatorNode(object):
 
     def _render(self, number, state, stamp_ns):
         """Render and publish an image in the thread of the renderer, one at a time."""
-        if self._clock_pub is None and self._rendering is not None and not self._rendering.done():
-            self._diagnostics.count('images skipped')
-            return
         self._wait_for_image()
         self._rendering = self._renderer.submit(self._publish_image, number, state, stamp_ns)
 
@@ -226,16 +212,13 @@ class SimulatorNode(object):
         self._diagnostics.record_latency(time_from(stamp_ns))
 
     def _publish_clock(self, stamp_ns):
-        if self._clock_pub is not None:
-            self._clock_pub.publish(Clock(time_from(stamp_ns)))
+        self._clock_pub.publish(Clock(time_from(stamp_ns)))
 
 
 def _scenario(params):
     if not params.scenario:
         raise ValueError('no scenario given; set ~scenario (launch argument scenario:=) to the path of a file such as '
                          'those in config/scenarios')
-    if params.supervised and not params.publish_clock:
-        raise ValueError('parameter ~supervised is true; it needs ~publish_clock')
     try:
         scenario = read_scenario(params.scenario)
     except OSError as error:
