@@ -18,7 +18,7 @@ from tf2_msgs.msg import TFMessage
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
-from support.planners import person
+from support.track_messages import person
 from support.ros import Recorder, header_at, publisher, wait_until
 
 LATENCY_NS, TIMEOUT_S = NS // 10, 0.5

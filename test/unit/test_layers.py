@@ -89,12 +89,10 @@ MODULES = [module for module in modules_in(SOURCE) if not module.endswith('.__in
 
 
 @functools.lru_cache(maxsize=None)
-def imports_of(module, root=SOURCE, at_the_top=False):
-    """Top-level names of other packages, and dotted names of ours, that a module imports, or only when it is loaded."""
+def imports_of(module, root=SOURCE):
+    """Top-level names of other packages, and dotted names of ours, that a module imports."""
     with open(os.path.join(root, *module.split('.')) + '.py') as stream:
         tree = ast.parse(stream.read())
-    if at_the_top:
-        tree.body = [node for node in tree.body if isinstance(node, (ast.Import, ast.ImportFrom))]
     names = [name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names]
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom):

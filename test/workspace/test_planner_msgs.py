@@ -1,4 +1,4 @@
-"""Tracks as planners read them: each message is serialized, and passed to a replica of its reader."""
+"""Tracks as planners read them: each message is serialized."""
 import os
 import sys
 
@@ -22,7 +22,6 @@ from ros_3d_bb.planning.planner_view import footprint_points, in_frame, predicte
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
 from support.masterless import on_the_wire
 from support.planner_definitions import PUBLISHED_MD5, message_class, package
-from support.planners import JackalMpcReplica
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 QUARTER = transform_from((10, 5, 0), (0, 0, np.sqrt(0.5), np.sqrt(0.5)))  # odom_from_map: a quarter turn to the left
@@ -79,18 +78,17 @@ def test_points_of_obstacles_are_exact_only_in_a_frame_near_the_robot():
 
 
 def test_mpc_planner_jackal_receives_everyone_with_radius_and_velocity():
-    mpc = JackalMpcReplica()
-    message = sent(objects_to_msg, 'derived_object_msgs', [
-        walker(1, [1, 2, 0.9], [0.3, -1.1, 0]), walker(2, [4, 2, 0.9], [0, 0, 0], width_m=0.4)])
-    mpc.receive(message)
-    assert sorted(mpc.obstacles) == [1, 2]
-    centre, radius, velocity = mpc.obstacles[1]
-    np.testing.assert_allclose(centre, [1, 2])
-    np.testing.assert_allclose(velocity, [0.3, -1.1])
-    assert radius == pytest.approx(0.3) and mpc.obstacles[2][1] == pytest.approx(0.2)
-    item = message.objects[0]
-    assert (item.detection_level, item.classification, item.object_classified) == (1, 4, True)  # tracked pedestrian
-    assert item.shape.dimensions == pytest.approx((1.7, 0.3)) and item.header.stamp == time_from(STAMP_NS)
+    """It skips ID 0, takes the second dimension as the radius, and turns the twist by minus the yaw of the pose
+    (tud-amr/mpc_planner, ros1_jackal.cpp, obstacleCallback)."""
+    walking, standing = sent(objects_to_msg, 'derived_object_msgs', [
+        walker(1, [1, 2, 0.9], [0.3, -1.1, 0]), walker(2, [4, 2, 0.9], [0, 0, 0], width_m=0.4)]).objects
+    assert (walking.id, standing.id, walking.pose.orientation.w) == (1, 2, 1)
+    assert walking.shape.type == standing.shape.type == walking.shape.CYLINDER
+    assert (walking.pose.position.x, walking.pose.position.y) == (1, 2)
+    assert (walking.twist.linear.x, walking.twist.linear.y) == (0.3, -1.1)
+    assert (walking.detection_level, walking.classification, walking.object_classified) == (1, 4, True)  # pedestrian
+    assert walking.shape.dimensions == pytest.approx((1.7, 0.3)) and standing.shape.dimensions[1] == pytest.approx(0.2)
+    assert walking.header.stamp == time_from(STAMP_NS)
 
 
 @pytest.mark.parametrize('status, tag, reliability', [(VISIBLE, 'visible', 1.0), (OCCLUDED, 'occluded', 0.5),
