@@ -9,17 +9,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.out_of_sequence import LATEST_NS, MOST_KEPT
 from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView, Detection
+from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView
 from support.cylinders import mounted
+from support.people import CAMERA, START_NS, at, ids
 
-START_NS, PERIOD_NS = 1000 * NS, NS // 30
-CAMERA = Camera(640, 480, 533.0, 533.0, 319.5, 239.5)
+PERIOD_NS = NS // 30
 EDGE = 0.6  # x / z of what the image border shows
 
 
@@ -41,8 +40,7 @@ def shown(view, place_m, offset_m=(0, 0)):
     distance, bearing = view.bearings(np.array([place_m]))
     if not abs(np.tan(bearing[0])) < EDGE - 0.05 or abs(bearing[0]) > 1:
         return []
-    center = np.append(np.add(place_m, offset_m), 0.85)
-    return [Detection(center, np.array([0.5, 0.5, 1.7]), np.eye(3) * 0.04 ** 2)]
+    return [at(*np.add(place_m, offset_m))]
 
 
 def images_of(seconds, place_at, views=(FRONT, LEFT), start_s=0.0, offsets_m=None):
@@ -63,10 +61,6 @@ def play(tracker, images):
 
 def standing(bearing):
     return lambda _time_s: around(bearing)
-
-
-def ids(objects):
-    return [track.id for track in objects]
 
 
 def low_camera(depth_m):
@@ -288,8 +282,7 @@ def group_images(seconds, rate_hz, offset_m=(0, 0), jump_m=(0, 0), jump_s=np.inf
         shift_m = moved_m + np.multiply(offset_m, view is LEFT)
         places_m = [around(*person) + shift_m + 0.5 * sigma_m * random.normal(size=2) for person in GROUP]
         yield (START_NS + int(round(time_s * NS)),
-               [Detection(np.append(place_m, 0.85), np.array([0.5, 0.5, 1.7]), np.eye(3) * sigma_m ** 2)
-                for place_m in places_m], view._replace(fixed_from_camera=pose))
+               [at(*place_m, sigma=sigma_m) for place_m in places_m], view._replace(fixed_from_camera=pose))
 
 
 def steps_m(published):
