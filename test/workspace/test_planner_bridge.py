@@ -102,6 +102,7 @@ def test_costs_are_around_the_robot_where_it_is_now():
         bridge.send(START_NS, person(1, 0, 0))
         grid = bridge.message(COSTS)
         assert (grid.header.frame_id, grid.header.stamp.to_nsec()) == ('base_link', 0)
+        assert bridge.message(POINTS).header.stamp.to_nsec() == START_NS
         columns = np.reshape(grid.data, (grid.info.height, grid.info.width)).max(axis=0)
         x_m = grid.info.origin.position.x + (np.flatnonzero(columns == 99) + 0.5) * grid.info.resolution
         assert x_m.mean() == pytest.approx(2.0, abs=0.05)
