@@ -50,7 +50,6 @@ def pytest_terminal_summary(terminalreporter, config):
 
 
 def pytest_ignore_collect(path, config):
-    """Ignore files that cannot be imported."""
     return bool(path.basename.startswith('test_') and imports_when_loaded(str(path)) & left_out(config)) or None
 
 
@@ -137,7 +136,6 @@ def camera_package(tmp_path):
 
 @pytest.fixture
 def window_on():
-    """Opens the annotator's window on the session in a folder."""
     from support.window import Driver  # imports Qt
     drivers = []
 
@@ -151,19 +149,16 @@ def window_on():
 
 @pytest.fixture
 def folder(tmp_path):
-    """A small measurement session."""
     from support.small_session import write_small_session
     return write_small_session(str(tmp_path))
 
 
 @pytest.fixture
 def document(folder):
-    """The document of `folder`."""
     from ros_3d_bb_annotator.document import Document
     return Document.open(folder)
 
 
 @pytest.fixture
 def drive(window_on, folder):
-    """The annotator's window on `folder`."""
     return window_on(folder)

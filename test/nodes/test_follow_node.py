@@ -43,7 +43,6 @@ class Witness(object):
         self._target = message.data
 
     def _on_tracks(self, message):
-        """Note which person of the truth the followed track is."""
         with self._lock:
             truth = self._truth.pop(message.header.stamp.to_nsec(), None)
         followed = [track for track in message.objects if track.id == self._target]

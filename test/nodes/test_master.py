@@ -45,12 +45,10 @@ def master(port):
 
 
 def set_label(label):
-    """As with rosparam set."""
     rosgraph.Master('/somebody').setParam('/test_master/label', label)
 
 
 def wait_for_reports(recorder, node, count):
-    """Wait for this many further reports of a node on /diagnostics."""
     begin = len(recorder.messages)
     wait_until(lambda: count <= sum(status.name.startswith(node) for message in recorder.messages[begin:]
                                     for status in message.status), '%d reports of %s' % (count, node), 40)

@@ -83,7 +83,6 @@ def test_the_publisher_decides_the_type_of_images():
 
 @pytest.fixture(scope='module')
 def clients():
-    """dynamic_reconfigure's client of each node."""
     created = {node: Client(node, timeout=TIMEOUT_S) for node in NODES}
     yield created
     for client in created.values():

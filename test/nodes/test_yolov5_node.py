@@ -28,7 +28,6 @@ def images(session_folder):
 
 @pytest.fixture(scope='module')
 def camera(weights):
-    """Publisher of images, to which the node has subscribed."""
     rospy.init_node('test_yolov5_node')
     with launched('yolov5.launch', 'weights:=' + weights):
         yield publisher('camera/color/image_raw', Image)

@@ -130,6 +130,5 @@ class DrivenRobot(object):
 
 
 def _newest_ns(recorder):
-    """Stamp of the newest message."""
     messages = recorder.messages
     return messages[-1].header.stamp.to_nsec() if messages else 0

@@ -150,13 +150,6 @@ def test_the_number_of_waiting_boxes_is_bounded(recorder):
     assert settled == [(n, None, None) for n in range(50)]
 
 
-def test_a_jump_back_in_time_clears_everything():
-    recorder = Recorder(assumed_delay_ns=50 * MS)
-    play(50 * MS, recorder=recorder)
-    recorder.add('boxes', 60 * PERIOD, 60 * PERIOD, 'from before the jump')
-    assert play(50 * MS, recorder=recorder) == [(n, n, n) for n in range(60)]
-
-
 @given(st.lists(st.tuples(st.sampled_from(['depth', 'camera', 'boxes', 'plain boxes']), st.integers(1, 200)),
                 max_size=80))
 def test_all_boxes_are_matched_or_lost_for_any_messages(events):

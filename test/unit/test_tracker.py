@@ -138,18 +138,6 @@ def cut_by(cut, visible_height, bottom=0.0):
     return at(2, 0, visible_height, cut, position_m=np.array([2.0, 0, visible_height / 2 + bottom]))
 
 
-def test_a_track_continues_with_truncated_boxes():
-    """First the feet, which the estimator completes to 1.7 m, then also the head: 0.56 m remain."""
-    def walk(time_s):
-        return [at(2, 0, height=1.75) if time_s < 1 else cut_by(['bottom'], 1.7, bottom=0.05) if time_s < 2
-                else cut_by(['top', 'bottom'], 0.56, bottom=0.3)]
-    published = play(Tracker(), 4, walk)
-    assert set(track.id for objects in published for track in objects) == {1}
-    assert all(len(objects) == 1 and objects[0].status == VISIBLE for objects in published[4:])
-    track, = published[-1]
-    np.testing.assert_allclose((track.position_m[2], track.size_m[2]), (0.875, 1.75), atol=0.03)
-
-
 def test_people_are_distinguished_by_their_heads_if_feet_are_truncated():
     """A child's track is not matched with an adult at the same position, although the feet of both are truncated."""
     def swapped(time_s):

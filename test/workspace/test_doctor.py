@@ -40,7 +40,6 @@ def changed(bag, folder, change):
 
 
 def examined(path, camera='', target_frame='', depth='aligned'):
-    """Findings, and the next command."""
     given = argparse.Namespace(bag=str(path), camera=camera, target_frame=target_frame, depth=depth)
     found, command, _purpose = bag_findings(given)
     return found, command

@@ -11,7 +11,6 @@ LEADER, SWITCHING_S = 1, 1.0  # longest time on another person whose track has t
 
 
 def longest_s(moments, condition):
-    """Longest time for which a condition holds, seconds."""
     longest, since_s = 0.0, None
     for moment in moments:
         since_s = (moment.time_s if since_s is None else since_s) if condition(moment) else None

@@ -32,7 +32,6 @@ DEPTH = Settings(detector='depth')
 
 @pytest.fixture(scope='module')
 def scene(tmp_path_factory):
-    """A bag of two people, one and a half seconds long."""
     path = str(tmp_path_factory.mktemp('scene') / 'scene.bag')
     write_bag(scenario_images(scenario_from(SCENE)), path)
     return path

@@ -36,7 +36,6 @@ class Robot(object):
         return self._connections.publishers['cmd_vel'].newest.linear.x
 
     def limit(self):
-        """The published limit."""
         (_period_s, on_timer), = self._connections.timers
         on_timer(None)
         return self._connections.publishers['~speed_limit'].newest.data
