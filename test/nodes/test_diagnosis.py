@@ -113,7 +113,6 @@ def check_output(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def rig():
-    rospy.init_node('test_diagnosis')
     return Rig()
 
 

@@ -57,7 +57,6 @@ def position_of(track):
 
 @pytest.fixture(scope='module')
 def witness():
-    rospy.init_node('test_follow_node')
     with launched('simulation.launch', 'scenario:=' + SCENE, 'drive:=true', 'rviz:=false', 'single_process:=true'), \
             launched('follow.launch', 'enabled:=true'):
         witness = Witness()

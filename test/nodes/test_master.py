@@ -6,6 +6,7 @@ import subprocess
 import time
 from unittest import mock
 
+import pytest
 import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
@@ -24,6 +25,11 @@ from support.ros import TIMEOUT_S, Recorder, launched, wait_until
 from support.stage import RECOVERY_IMAGES, Stage
 
 NODES = '/people_node', '/planner_bridge_node'
+
+
+@pytest.fixture(scope='session', autouse=True)
+def ros_node():
+    """Without the master of rostest."""
 
 
 def has_master():

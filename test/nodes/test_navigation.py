@@ -35,8 +35,6 @@ def two_people(seconds):
 def robot(request):
     """The robot without people around it; the nodes run. The parameter is the local planner, by default dwa."""
     environment = planner_environment()
-    if not rospy.core.is_initialized():
-        rospy.init_node('test_navigation')
     nodes = subprocess.Popen(['roslaunch', os.path.join(ROOT, 'test', 'support', 'navigation.launch'),
                               'local_planner:=' + getattr(request, 'param', 'dwa')], env=environment)
     driven = DrivenRobot()

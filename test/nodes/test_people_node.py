@@ -36,11 +36,6 @@ LIVE = {'bbox3d_node': live_in([Bbox3dParams]),
 NODES = sorted(LIVE)
 
 
-@pytest.fixture(scope='module', autouse=True)
-def node():
-    rospy.init_node('test_people_node')
-
-
 def test_people_are_tracked_above_the_floor_that_is_seen():
     """Images of a rolled camera without tf."""
     simulator = RolledSimulator()

@@ -1,7 +1,6 @@
 """The pipeline on the bag of a measurement session. Needs a master and the clock of the bag."""
 import numpy as np
 import pytest
-import rospy
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ros_3d_bb.bags.bag_writer import MOUNT_M, START_NS, session_images, write_bag
@@ -9,11 +8,6 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.sessions.session_reader import read_session
 from support.ros import Recorder, launched
-
-
-@pytest.fixture(scope='module', autouse=True)
-def node():
-    rospy.init_node('test_pipeline')
 
 
 @pytest.mark.parametrize('single_process', ['false', 'true'])

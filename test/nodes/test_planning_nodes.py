@@ -73,7 +73,6 @@ class Rig(object):
 
 @pytest.fixture(scope='module')
 def rig():
-    rospy.init_node('test_planning_nodes')
     return Rig()
 
 

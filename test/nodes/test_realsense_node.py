@@ -3,7 +3,6 @@ import contextlib
 
 import numpy as np
 import pytest
-import rospy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
@@ -20,7 +19,6 @@ TOPICS = dict({'/tf_static': TFMessage, '/clock': Clock}, **IMAGE_TOPICS)
 
 @pytest.fixture(scope='module')
 def recording(tmp_path_factory):
-    rospy.init_node('test_realsense_node')
     path = str(tmp_path_factory.mktemp('recording') / ('a' + SUFFIX))
     return write_recording(path, [colored(number) for number in range(FRAMES)], [sloping_depth()] * FRAMES)
 

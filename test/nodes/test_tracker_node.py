@@ -3,7 +3,6 @@ import itertools
 import time
 
 import pytest
-import rospy
 from dynamic_reconfigure.client import Client
 from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import OccupancyGrid
@@ -46,7 +45,6 @@ class Rig(object):
 
 @pytest.fixture(scope='module')
 def rig():
-    rospy.init_node('test_tracker_node')
     return Rig()
 
 

@@ -83,11 +83,6 @@ def entries(folder):
     return read_session(folder).frames if os.path.exists(os.path.join(folder, 'frames.json')) else ()
 
 
-@pytest.fixture(scope='module', autouse=True)
-def node():
-    rospy.init_node('test_viewer_node')
-
-
 @pytest.fixture(scope='module')
 def folder(tmp_path_factory):
     return str(tmp_path_factory.mktemp('measurements') / 'a session')

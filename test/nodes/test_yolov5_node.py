@@ -28,7 +28,6 @@ def images(session_folder):
 
 @pytest.fixture(scope='module')
 def camera(weights):
-    rospy.init_node('test_yolov5_node')
     with launched('yolov5.launch', 'weights:=' + weights):
         yield publisher('camera/color/image_raw', Image)
 
