@@ -1,10 +1,20 @@
-"""Detections of people in front of a camera that stands at the origin of the map, 1 m up, and looks along x."""
+"""Poses of cameras, and detections of people in front of one at the origin of the map, 1 m up, that looks along x."""
 import numpy as np
 
-from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import CameraView, Detection
-from support.cylinders import mounted
+
+
+def mounted(height_m, pitch_deg=0.0, roll_deg=0.0, yaw_deg=0.0):
+    """The transform of a camera above the origin, which looks along x, then turned left, pitched down and rolled."""
+    transform = transform_from((0, 0, height_m), (0, 0, 0, 1))
+    for axis, angle_deg in ((2, yaw_deg), (1, pitch_deg), (0, roll_deg)):
+        half = np.radians(angle_deg) / 2
+        quaternion = np.eye(4)[axis] * np.sin(half) + np.eye(4)[3] * np.cos(half)
+        transform = transform.dot(transform_from((0, 0, 0), quaternion))
+    return transform.dot(transform_from((0, 0, 0), OPTICAL_ROTATION))
+
 
 CAMERA = Camera(640, 480, 533.0, 533.0, 319.5, 239.5)  # sees x from -0.6 to 0.6 of the depth
 VIEW = CameraView(mounted(1.0), CAMERA)

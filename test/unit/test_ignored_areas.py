@@ -37,14 +37,6 @@ def test_a_new_area_ends_the_tracks_in_it_and_keeps_the_others():
     assert ids_among(tracker, 4, 1, (3.5, 0.2), (3.5, 1.2)) == [[2]] * 10
 
 
-def test_of_a_poster_on_a_wall_and_a_person_before_it_one_is_a_person():
-    wall = np.zeros((60, 60), bool)
-    wall[:, 40] = True  # x from 4.0 to 4.1 of the map
-    tracker = Tracker()
-    tracker.set_map(OccupiedCells(wall, 0.1, (0.0, -3.0, 0.0)))
-    assert ids_among(tracker, 1, 2, (4.25, 0.0), (3.7, -0.8))[-1] == [1]
-
-
 def test_the_first_map_ends_the_tracks_on_it_and_later_ones_do_not():
     tracker, wall = Tracker(), np.ones((10, 10), bool)
     assert ids_among(tracker, 1, 2, (3.5, 0.2))[-1] == [1]

@@ -10,7 +10,7 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.tracking.occlusion import classify_visibility, depths_towards
 from ros_3d_bb.tracking.track import PRESENT
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView
-from support.cylinders import mounted
+from support.people import mounted
 
 CAMERA = Camera(640, 480, 600.0, 600.0, 319.5, 239.5)
 LOOK = mounted(1.0)

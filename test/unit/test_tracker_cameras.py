@@ -15,8 +15,7 @@ from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.out_of_sequence import LATEST_NS, MOST_KEPT
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView
-from support.cylinders import mounted
-from support.people import CAMERA, START_NS, at, ids
+from support.people import CAMERA, START_NS, at, ids, mounted
 
 PERIOD_NS = NS // 30
 EDGE = 0.6  # x / z of what the image border shows
@@ -135,14 +134,6 @@ def test_two_people_side_by_side_in_both_views_are_two_tracks():
     assert ids(objects) == [1, 2]
     for track, place_m in zip(objects, places):
         assert np.linalg.norm(track.position_m[:2] - place_m) < 0.2
-
-
-def test_a_person_is_out_of_view_if_out_of_all_views():
-    """The person walks out of the left view, past its outer border."""
-    published = play(Tracker(), images_of(5, lambda time_s: around(0.9 + 0.4 * time_s)))
-    states = [objects[0].status if objects else None for objects in published[20:]]
-    assert OUT_OF_VIEW in states and states[-1] is None
-    assert 60 <= states.count(OUT_OF_VIEW) <= 120 and states.count(OCCLUDED) <= 2  # at the border
 
 
 def test_a_camera_that_ends_neither_keeps_tracks_nor_delays_others():

@@ -13,8 +13,7 @@ from ros_3d_bb.tracking.thesis_tracker import ThesisTracker, ThesisTrackerParams
 from ros_3d_bb.tracking.track import PredictionParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
 from ros_3d_bb.tracking.types import CameraView, Detection
-from support.cylinders import mounted
-from support.people import CAMERA, START_NS, VIEW
+from support.people import CAMERA, START_NS, VIEW, mounted
 from support.states import covariance_of
 
 PERIOD_NS = NS // 30

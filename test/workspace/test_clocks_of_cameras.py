@@ -78,17 +78,6 @@ def test_time_jumps_back_once_if_all_cameras_do(rig):
     assert [track.id for track in front.tracks] == [2] and stamp_of(rear) == START_NS + 19 * PERIOD_NS
 
 
-def test_time_jumps_back_twice(rig):
-    """Two seeks in a bag before the rear camera's detector is ready."""
-    for number in range(200):
-        for camera in ('front', 'rear'):
-            rig.send(START_NS + number * PERIOD_NS, camera)
-    for seconds in (10, 5):
-        assert rig.send(START_NS + seconds * NS, 'front') is None
-    for camera in ('rear', 'front'):
-        assert rig.send(START_NS + 5 * NS + PERIOD_NS, camera) is not None
-
-
 def test_image_awaiting_its_transform_is_dropped_when_time_goes_back(rig):
     """The front camera's first image of the new time comes in the rear camera's wait; the rear camera ends there."""
     for number in range(200):

@@ -17,7 +17,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject as Track, detections_from_boxes
-from support.cylinders import mounted
+from support.people import mounted
 from support.masterless import on_the_wire
 from support.ros import header_at
 
