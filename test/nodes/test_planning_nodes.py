@@ -10,11 +10,13 @@ import time
 import numpy as np
 import pytest
 import rospy
-from geometry_msgs.msg import TransformStamped, Twist, Vector3
+from geometry_msgs.msg import Twist, Vector3
 from sensor_msgs.msg import LaserScan, PointCloud2
 from std_msgs.msg import Float32
 from tf2_msgs.msg import TFMessage
 
+from ros_3d_bb.camera.camera_model import transform_from
+from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
@@ -42,9 +44,8 @@ class Rig(object):
     def send(self, *positions, ranges_m=OPEN_M):
         """Standing people at positions (x, y) of the map, and a scan. Returns the stamp."""
         stamp_ns = rospy.get_rostime().to_nsec() - LATENCY_NS
-        robot = TransformStamped(header=header_at(stamp_ns, 'map'), child_frame_id='base_link')
-        robot.transform.translation.x, robot.transform.translation.y, robot.transform.rotation.w = 5.0, 1.0, 1.0
-        self._tf.publish(TFMessage([robot]))
+        robot = 'map', 'base_link', transform_from((5, 1, 0), (0, 0, 0, 1))
+        self._tf.publish(TFMessage(transform_messages(time_from(stamp_ns), [robot])))
         self.tracks.publish(TrackedObjectArray(header=header_at(stamp_ns, 'map'), objects=[
             person(number, x, y, moving=False, speed=0.0) for number, (x, y) in enumerate(positions, 1)]))
         if ranges_m is not None:

@@ -6,10 +6,11 @@ from unittest import mock
 import numpy as np
 import pytest
 import rospy
-from geometry_msgs.msg import TransformStamped
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
+from ros_3d_bb.camera.camera_model import transform_from
+from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
@@ -52,11 +53,8 @@ class Bridge(object):
 
     def send_tf(self, stamp_ns, child, translation):
         """The pose of a frame in the map; it is turned by a quarter to the left."""
-        transform = TransformStamped(header=Header(stamp=time_from(stamp_ns), frame_id='map'), child_frame_id=child)
-        place, turn = transform.transform.translation, transform.transform.rotation
-        place.x, place.y, place.z = translation
-        turn.z = turn.w = 0.5 ** 0.5
-        self._connections.send('/tf', TFMessage([transform]))
+        pose = transform_from(translation, (0, 0, 1, 1))
+        self._connections.send('/tf', TFMessage(transform_messages(time_from(stamp_ns), [('map', child, pose)])))
 
     def send(self, stamp_ns, *tracks, frame_id='map'):
         header = Header(stamp=time_from(stamp_ns), frame_id=frame_id)
