@@ -75,11 +75,6 @@ def test_max_age_applies_to_a_person_who_stops_behind_a_pillar():
         assert ids(after[-1]) == expected
 
 
-def test_duplicate_boxes_do_not_start_a_second_track():
-    walk = play(Tracker(), 2, standing((3, 0), (3.1, 0.15)))
-    assert all(len(objects) <= 1 for objects in walk)
-
-
 def test_two_tracks_that_meet_in_one_person_become_one():
     """A detector draws two boxes of one person, at first far apart."""
     published = play(Tracker(), 3, lambda time_s: [at(3, 0), at(3, max(0.02, 0.8 - 1.2 * time_s))])
@@ -151,13 +146,6 @@ def test_a_duplicate_or_too_late_image_is_rejected_without_any_change(late_s):
         tracker.update(START_NS + int(round((29 / 30 - late_s) * NS)), [at(3, 1)], VIEW)
     np.testing.assert_array_equal(tracker.tracks()[0].covariance, before[0].covariance)
     assert ids(tracker.update(START_NS + NS, [at(3, 0)], VIEW)) == [1]
-
-
-def test_a_skipped_image_from_the_future_does_not_keep_tracks():
-    tracker = Tracker()
-    play(tracker, 1, standing((3, 0)))
-    tracker.skip(START_NS + 100 * NS)
-    assert play(tracker, 1, standing(), start_s=1)[-1] == []
 
 
 def test_new_parameters_apply_from_the_next_image_on_and_tracks_are_kept():
