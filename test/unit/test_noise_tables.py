@@ -1,8 +1,10 @@
-"""Reader of measurements for the noise analysis: content and errors."""
+"""Reader of measurements for the noise analysis, and statistics of clusters of known distributions."""
 import numpy as np
 import pytest
 
-from ros_3d_bb_lab.evaluation.noise.tables import read_session_measurements, read_table
+from ros_3d_bb_lab.evaluation.noise.analysis import Inputs, analyse
+from ros_3d_bb_lab.evaluation.noise.statistics import cluster_statistics
+from ros_3d_bb_lab.evaluation.noise.tables import Cluster, MeasurementTable, read_session_measurements, read_table
 from support.noise_tables import write_table
 from support.small_session import change_json, write_small_session
 
@@ -53,3 +55,17 @@ def test_an_outlier_does_not_remove_the_other_person_of_its_image(tmp_path):
     plausible = table.without(table.outliers())
     assert len(table.ids) == 16 and plausible.ids.count('m3 (by the door)') == 1
     assert sorted(plausible.truth_m[:, 1].tolist()) == 8 * [2.0] + 7 * [3.0]
+
+
+@pytest.mark.parametrize('kind', ['normal', 'laplace', 'standard_cauchy'])
+def test_other_distributions_are_no_gaussian(kind):
+    drawn = 0.02 * getattr(np.random.RandomState(3), kind)(size=300)
+    assert cluster_statistics(Cluster(1.0, drawn)).looks_gaussian == (kind == 'normal')
+
+
+def test_a_campaign_whose_people_at_the_sides_are_all_truncated_is_named():
+    truth_m = np.repeat([(x, z) for x in (-0.5, 0.0, 0.5) for z in (1.0, 1.5, 2.0)], 3, axis=0)
+    table = MeasurementTable('made', np.insert(truth_m, 1, 0, axis=1), truth_m, truth_m[:, 0] != 0,
+                             tuple(map(str, range(len(truth_m)))))
+    with pytest.raises(ValueError, match='2 values of X true needed; there are 9 at 0 m, without people who are trunc'):
+        analyse(Inputs.of_session(table, 'foreground', 'none'))

@@ -1,6 +1,4 @@
-"""Parts of the nodes in situations that a graph cannot produce on demand: concurrent threads, and a master that accepts
-connections and never responds.
-"""
+"""Parts of the nodes in situations that a graph cannot produce on demand: concurrent threads, and masters that fail."""
 import contextlib
 import socket
 import threading
@@ -13,9 +11,11 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.nodes.bbox3d_node import SampleImages
 from ros_3d_bb.nodes.common import master, startup, subscribers
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics, unsubscribed_results
+from ros_3d_bb.nodes.tracker_node import RESERVED_IDS, TrackIdReservation
 from support.ros import wait_until
 
 
@@ -112,3 +112,62 @@ def test_topics_of_dynamic_reconfigure_are_no_results():
         assert unsubscribed_results() == ['/ros_3d_bb/tracks']
         tracks.has_connections.return_value = True
         assert unsubscribed_results() == []
+
+
+NAME = '/tracker_node_numbers'
+
+
+def immediately(work, on_error):
+    """In place of the worker thread."""
+    def offer(item):
+        try:
+            work(item)
+        except OSError as error:
+            on_error(error)
+    return mock.Mock(offer=offer)
+
+
+@pytest.fixture
+def parameters(monkeypatch):
+    """The parameters; if 'fails' is among them, the master accepts no others."""
+    parameters = {}
+
+    def set_param(name, value):
+        if 'fails' in parameters:
+            raise ConnectionRefusedError(111, 'Connection refused')
+        parameters[name] = value
+    monkeypatch.setattr('rospy.get_name', lambda: '/tracker_node')
+    monkeypatch.setattr('rospy.get_param', lambda name, default: parameters.get(name, default))
+    monkeypatch.setattr('rospy.set_param', set_param)
+    monkeypatch.setattr('ros_3d_bb.nodes.tracker_node.on_new_master', lambda _function: None)
+    monkeypatch.setattr('ros_3d_bb.nodes.tracker_node.NewestWorker', immediately)
+    return parameters
+
+
+def test_a_restarted_tracker_continues_after_all_ids_assigned_before(parameters):
+    largest = 0
+    for life in range(5):
+        reservation = TrackIdReservation(EventCounter())
+        assert reservation.last_id >= largest and parameters[NAME] == reservation.last_id + RESERVED_IDS
+        for number in range(1, 700 * (life + 1), 100):
+            largest = reservation.last_id + number
+            reservation.reserve([mock.Mock(id=largest)])
+            assert parameters[NAME] > largest
+
+
+def test_ids_continue_without_the_master_and_the_fault_is_reported(parameters):
+    events = EventCounter()
+    reservation = TrackIdReservation(events)
+    parameters['fails'] = True
+    reservation.reserve([mock.Mock(id=5 * RESERVED_IDS)])
+    assert NAME in events.sentences['track IDs not reserved']
+    del parameters['fails']
+    reservation.reserve([mock.Mock(id=5 * RESERVED_IDS + 1)])
+    assert parameters[NAME] == 6 * RESERVED_IDS + 1
+
+
+@pytest.mark.parametrize('value', ['many', -1, 1.5, True, 2 ** 31 - 1])
+def test_an_invalid_parameter_is_rejected(parameters, value):
+    parameters[NAME] = value
+    with pytest.raises(ValueError, match=NAME):
+        TrackIdReservation(EventCounter())

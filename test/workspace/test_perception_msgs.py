@@ -1,24 +1,24 @@
-"""Conversions between messages and types of this package: round trips, and rejected messages."""
-import numpy as np
-import pytest
+"""Conversions between messages and types of this package: round trips, rejected messages, and camera_info."""
 from geometry_msgs.msg import Point, Vector3
 from hypothesis import given, strategies as st
+import numpy as np
+import pytest
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 
 from fuzz.hostile import transforms as transforms_at
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.conversions.camera_msgs import CameraFrame, messages_of
-from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, boxes2d_to_msg, boxes3d_from_msg,
-                                                   boxes3d_to_msg, camera_from_msg, stamp_of, time_from,
-                                                   tracks_from_msg, tracks_to_msg, usable_boxes3d, with_stamp)
+from ros_3d_bb.conversions.camera_msgs import CameraFrame, info_of_images, info_topic_beside, messages_of
+from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, boxes2d_to_msg, boxes3d_from_msg, boxes3d_to_msg,
+                                                   camera_from_msg, stamp_of, time_from, tracks_from_msg, tracks_to_msg,
+                                                   usable_boxes3d, with_stamp)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject as Track, detections_from_boxes
-from support.people import mounted
 from support.masterless import on_the_wire
+from support.people import mounted
 from support.ros import header_at
 
 INT32 = st.integers(-2 ** 31, 2 ** 31 - 1)
@@ -231,3 +231,22 @@ def test_with_stamp_changes_only_the_stamp():
     transforms = with_stamp(transforms_at(1), stamp).transforms
     assert [(link.header.stamp, link.header.frame_id) for link in transforms] == [(stamp, 'map'), (stamp, 'base_link')]
     assert with_stamp(CameraInfo(header=header_at(1, 'camera')), stamp).header == header_at(7 * NS + 5, 'camera')
+
+
+@pytest.mark.parametrize('image_topic', ['/camera/depth/image', '/camera/depth/image/compressedDepth',
+                                         '/camera/depth/image/compressed'])
+def test_camera_info_is_in_the_namespace_of_the_image(image_topic):
+    assert info_topic_beside(image_topic) == '/camera/depth/camera_info'
+
+
+@pytest.mark.parametrize('topic,is_rectified', [
+    ('/kinect2/qhd/image_depth_rect', True), ('/camera/depth/image_rect_raw/compressedDepth', True),
+    ('/camera/rgb/image_rect_color', True), ('/camera/rgb/image_raw', False), ('/rect/image_direct', False)])
+def test_rectified_images_have_no_distortion(topic, is_rectified):
+    info = CameraInfo(width=640, height=480, distortion_model='plumb_bob', D=[0.1, 0, 0, 0, 0],
+                      K=[600, 0, 320, 0, 600, 240, 0, 0, 1], P=[580, 0, 318, 0, 0, 581, 239, 0, 0, 0, 1, 0])
+    camera = camera_from_msg(info_of_images(info, topic))
+    assert camera[2:6] == ((580, 581, 318, 239) if is_rectified else (600, 600, 320, 240))
+    assert bool(camera.distortion) is not is_rectified and info.K[0] == 600
+    info.P = [0] * 12  # unknown
+    assert camera_from_msg(info_of_images(info, topic)).fx == 600

@@ -1,4 +1,4 @@
-"""speed_limit_node without a master: which commands pass."""
+"""speed_limit_node and follow_node without a master: which commands pass, and when goals are sent again."""
 import contextlib
 
 import numpy as np
@@ -10,6 +10,7 @@ from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, time_from, tracks_to_msg
 from ros_3d_bb.conversions.planner_msgs import velocity_to_msg
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.nodes.follow_node import RESENT_S, FollowNode
 from ros_3d_bb.nodes.speed_limit_node import SpeedLimitNode
 from support.masterless import masterless
 from support.tracks import track_at
@@ -76,3 +77,22 @@ def test_the_robot_stops_before_the_whole_length_of_a_bicycle():
         robot.forwarded(START_NS, bicycle)
         speed_mps = robot.limit()
         assert 1.0 < 0.3 * speed_mps + speed_mps ** 2 / 2 <= 1.175
+
+
+def goals_sent(distance_m, seconds):
+    """Number of goals for a robot that does not move, with a person who stands ahead."""
+    with masterless({'output': 'goal', 'enabled': True}) as connections:
+        FollowNode()
+        for elapsed_s in np.arange(0, seconds, 0.1):
+            connections.now = stamp = time_from(START_NS + int(elapsed_s * NS))
+            connections.send('/tf', TFMessage(transform_messages(stamp, [('map', 'base_link', np.eye(4))])))
+            track = track_at([distance_m, 0, 0.9], [0, 0, 0], moving=False)
+            connections.send(TRACKS_TOPIC, tracks_to_msg([track], Header(stamp=stamp, frame_id='map')))
+            for _period, on_timer in connections.timers:
+                on_timer(None)
+        return connections.publishers['move_base_simple/goal'].count
+
+
+def test_only_a_goal_that_is_not_reached_is_sent_again():
+    assert goals_sent(6.0, 3 * RESENT_S + 1) == 4
+    assert goals_sent(2.0, 3 * RESENT_S + 1) == 1
