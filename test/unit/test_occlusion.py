@@ -28,13 +28,6 @@ def with_depth(values_mm):
     return PLAIN._replace(depth_at=functools.partial(depths_towards, CAMERA, depth))
 
 
-@pytest.mark.parametrize('x,y,expected', [
-    (3, 0, VISIBLE), (3, 1.3, VISIBLE), (3, 1.7, OUT_OF_VIEW), (3, -1.7, OUT_OF_VIEW), (-3, 0, OUT_OF_VIEW),
-    (0.2, 0, OUT_OF_VIEW), (7, 0, OUT_OF_VIEW)])
-def test_positions_are_in_view_or_not(x, y, expected):
-    assert place(x, y) == expected
-
-
 FOLDING = Camera(640, 480, 280, 280, 320, 240, 'plumb_bob', (-0.35, 0.12, 0, 0, -0.019))  # before the border
 
 

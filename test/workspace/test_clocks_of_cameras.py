@@ -26,15 +26,6 @@ def test_one_stamp_of_the_future_costs_the_other_camera_no_image(play, ahead_ns,
     assert dict(play.counts, **{'images tracked': 0}) == {'images tracked': 0, AHEAD: 1}
 
 
-@pytest.mark.parametrize('seconds', [2, 100, 3600])
-def test_a_forward_seek_costs_one_image(play, seconds):
-    """The camera that is first after the seek loses it."""
-    play.run(3)
-    play.ahead_ns += seconds * NS
-    play.run(3)
-    assert play.counts[AHEAD] == 1 == play.lost('front') + play.lost('rear') and BACK not in play.counts
-
-
 @pytest.mark.parametrize('seconds', [0.5, 1.5, 10])
 @pytest.mark.parametrize('others, bag_pauses', [({'front'}, False), ({'rear'}, False), (set(), False), (set(), True)])
 def test_a_pause_of_a_camera_or_of_the_bag_costs_no_image(play, seconds, others, bag_pauses):
