@@ -2,9 +2,9 @@
 import os
 
 import cv2
-from hypothesis import given, settings, strategies as st
 import numpy as np
 import pytest
+from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.sessions.session_reader import SessionError, read_session
 from ros_3d_bb_annotator.document import Document

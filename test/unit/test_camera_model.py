@@ -1,8 +1,8 @@
 """Cameras and transforms: inverses and rejected values; cameras in portrait orientation or upside down."""
-from hypothesis import given, strategies as st
-from hypothesis.extra import numpy as hnp
 import numpy as np
 import pytest
+from hypothesis import given, strategies as st
+from hypothesis.extra import numpy as hnp
 
 from ros_3d_bb.camera.camera_model import (OPTICAL_ROTATION, Camera, quarter_turns, quaternion_from, transform_from,
                                            transform_points)

@@ -1,7 +1,7 @@
 """World with a robot that obeys commands: motion, limits, timeout, collisions, and people who give way."""
-from hypothesis import given, settings, strategies as st
 import numpy as np
 import pytest
+from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb_lab.simulation.collision import Rectangle

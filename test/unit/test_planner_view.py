@@ -1,7 +1,7 @@
 """Positions of people at the current time, frames and footprints, and which points show people."""
-from hypothesis import given, settings, strategies as st
 import numpy as np
 import pytest
+from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from, transform_points
 from ros_3d_bb.camera.depth_image import DepthImage

@@ -1,8 +1,8 @@
 """Snapshots combine the messages of one image for any order of arrival and delay, at once or in a burst."""
 import itertools
 
-from hypothesis import given, strategies as st
 import pytest
+from hypothesis import given, strategies as st
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.sessions.burst import Burst

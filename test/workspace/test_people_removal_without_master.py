@@ -16,8 +16,8 @@ from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.people_removal_node import PeopleRemovalNode
 from support.compressed import compressed_fields
 from support.masterless import masterless, on_the_wire
-from support.track_messages import person
 from support.ros import camera_info
+from support.track_messages import person
 
 STAMP_NS = 1000 * NS
 

@@ -1,8 +1,8 @@
 """Conversions between messages and types of this package: round trips, rejected messages, and camera_info."""
-from geometry_msgs.msg import Point, Vector3
-from hypothesis import given, strategies as st
 import numpy as np
 import pytest
+from geometry_msgs.msg import Point, Vector3
+from hypothesis import given, strategies as st
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 
