@@ -174,10 +174,7 @@ def test_an_invalid_entry_is_shown_with_its_fault(folder, break_it, problem):
     assert read_json(folder)['frames'][2]['truth_mm'] == {'x': 100, 'z': 2000}
 
 
-@pytest.mark.parametrize('edit', [
-    lambda content: content.pop('frames'), lambda content: content.update(frames=3),
-    lambda content: content.update(grid=[{'name': 'A', 'x': float('nan'), 'z': 1}])])
-def test_faults_of_the_whole_session_are_rejected(folder, edit):
-    change_json(folder, edit)
+def test_a_session_with_an_invalid_grid_is_rejected(folder):
+    change_json(folder, lambda content: content.update(grid=[{'name': 'A', 'x': float('nan'), 'z': 1}]))
     with pytest.raises(SessionError, match='frames.json'):
         Document.open(folder)
