@@ -26,7 +26,7 @@ def looking(yaw, camera):
 
 
 FRONT, LEFT = looking(0, 'front'), looking(np.pi / 4, 'left')
-IN_FRONT, IN_BOTH, AT_LEFT, BEHIND = 0.0, np.radians(22.5), np.radians(50), np.radians(180)  # bearings
+IN_FRONT, IN_BOTH, AT_LEFT = 0.0, np.radians(22.5), np.radians(50)  # bearings
 
 
 def around(bearing, range_m=3.0):

@@ -43,10 +43,6 @@ def scores(run, make):
     return scores_of([score_run(run, outputs_of(run, make))])
 
 
-def right(_number, truth):
-    return [track(1, truth.position_m[0]), track(2, truth.position_m[1])]
-
-
 def test_two_people_who_swap_ids_half_way_are_two_switches():
     late = IMAGES // 2
     result = scores(run_of(), lambda number, truth: [
