@@ -81,6 +81,14 @@ def test_a_free_running_depth_camera_is_paired_by_the_nearest_image(offset_ms, d
     assert paired == [(n, n) for n in range(60) if n % 7 != 3][-len(paired):] and len(paired) >= 49
 
 
+def test_boxes_of_the_first_image_wait_until_the_period_is_known():
+    recorder = Recorder(tolerance_ns=0)
+    recorder.add('camera', 0, 0, 'camera')
+    recorder.add('boxes', 0, 0, 'boxes')
+    assert recorder.add('depth', PERIOD * 2 // 5, PERIOD * 2 // 5, 'first') == []
+    assert recorder.add('depth', PERIOD * 7 // 5, PERIOD * 7 // 5, 'second') == [('boxes', 'first', 'camera')]
+
+
 def test_the_gap_to_the_nearest_depth_image():
     recorder = Recorder(tolerance_ns=0)
     assert recorder.sync.gap_text(NS) == ''
