@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from ros_3d_bb.estimation.error_model import XBias
-from ros_3d_bb_lab.evaluation.error_model_fit import data_of, fit_error_model, held_out
+from ros_3d_bb_lab.evaluation.error_model_fit import data_of, fit_error_model, held_out, scores_of
 from support.error_models import MODEL, PLACES_M, measure
 
 pytestmark = pytest.mark.slow  # each model is fitted many times
@@ -20,6 +20,13 @@ def test_recovers_the_bias(fitted):
     assert np.abs(fitted.corrected(SIMPLE.biased(true_m)) - true_m)[:, [0, 2]].max() < 0.03
     assert len(fitted.z_bias) == 3 and fitted.x_bias.per_angle_m == 0
     assert fitted.x_bias.slope == pytest.approx(-0.1, abs=0.01)
+
+
+def test_ellipses_contain_their_share(fitted):
+    measured_m, truth_m = measure(SIMPLE, 30, seed=2)
+    corrected_m = fitted.corrected(measured_m)
+    scores = scores_of(corrected_m, fitted.covariance(corrected_m), truth_m)
+    assert 0.92 < scores.coverage_95 < 0.99 and 0.62 < scores.coverage_68 < 0.8
 
 
 def test_scores_are_those_of_held_out_positions():
