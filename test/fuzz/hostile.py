@@ -4,21 +4,21 @@ import random
 
 import genpy
 import numpy as np
-from geometry_msgs.msg import Point, Pose, Quaternion, Transform, TransformStamped, Twist, Vector3
+from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
-from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
 from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS, CameraFrame, messages_of
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS, CameraFrame, messages_of, transform_messages
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg,
                                                    time_from)
 from ros_3d_bb.conversions.planner_msgs import points_to_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
 from support.masterless import on_the_wire
-from support.planners import person
+from support.track_messages import person
 
 FLOATS = (0.0, -0.0, 1.0, -1.0, 0.5, 3.0, float('nan'), float('inf'), -float('inf'), 1e308, -1e308, 5e-324, 1e-30, 1e6)
 INTEGERS = (0, 1, -1, 3, 7, 8, 10, 47, 48, 63, 64, 65, 255, 1000, 65535, 2 ** 31)  # and the limits of each type
@@ -74,12 +74,8 @@ def good_messages(stamp_ns):
 
 def transforms(stamp_ns):
     """Transforms from the map to the camera."""
-    message = TFMessage()
-    for parent, child, quaternion in (('map', 'base_link', (0, 0, 0, 1)),
-                                      ('base_link', 'camera', (-0.5, 0.5, -0.5, 0.5))):
-        message.transforms.append(TransformStamped(Header(stamp=time_from(stamp_ns), frame_id=parent), child,
-                                                   Transform(Vector3(), Quaternion(*quaternion))))
-    return message
+    return TFMessage(transform_messages(time_from(stamp_ns), [
+        ('map', 'base_link', np.eye(4)), ('base_link', 'camera', transform_from((0, 0, 0), OPTICAL_ROTATION))]))
 
 
 def damaged(source, message, now_ns):

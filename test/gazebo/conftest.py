@@ -31,7 +31,6 @@ class World(object):
         self.goal = rospy.Publisher('move_base_simple/goal', PoseStamped, queue_size=1)
 
     def _on_states(self, message):
-        """Positions of the people and of the robot, and the yaw of the robot."""
         models = {name: np.array([pose.position.x, pose.position.y]) for name, pose in zip(message.name, message.pose)
                   if name not in ('floor', 'room')}
         if ROBOT in models:
@@ -39,20 +38,16 @@ class World(object):
             self.truth.append((rospy.get_time(), models, 2 * np.arctan2(turned.z, turned.w)))
 
     def positions_at(self, time_s, name):
-        """True position (2,) at a time."""
         return self.truth[min(bisect.bisect(self.truth, (time_s,)), len(self.truth) - 1)][1][name]
 
     def wait_for(self, condition, what):
-        """Wait until a condition is true."""
         wait_until(condition, what, PATIENCE_S)
 
     def pass_s(self, seconds):
-        """Let simulated time pass."""
         end_s = rospy.get_time() + seconds
         self.wait_for(lambda: rospy.get_time() >= end_s, '%g s of simulated time' % seconds)
 
     def is_at(self, place_m):
-        """Whether the robot has arrived at a place (2,)."""
         return np.hypot(*(self.truth[-1][1][ROBOT] - place_m)) < 0.5
 
 

@@ -18,7 +18,6 @@ BODY_M, ROBOT_M = 0.2, 0.21  # from the centre to the surface of a person and to
 
 @pytest.fixture(scope='module')
 def people(start):
-    """The world of the package."""
     with start() as world:
         yield world
 

@@ -113,19 +113,16 @@ def check_output(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def rig():
-    rospy.init_node('test_diagnosis')
     return Rig()
 
 
 @pytest.fixture
 def healthy(rig):
-    """A graph without faults."""
     rig.wait_until_healthy()
     return rig
 
 
 def diagnosed():
-    """The faults that doctor prints."""
     found = graph_findings(argparse.Namespace(seconds=1.0, patience=0.0, target_frame='', camera=''))
     return '\n'.join(line for finding in found if finding.fault for line in finding.lines)
 

@@ -4,7 +4,6 @@ import csv
 import os
 import subprocess
 
-import pytest
 import rospy
 from geometry_msgs.msg import TransformStamped, Twist
 from std_msgs.msg import Header, Int32
@@ -15,11 +14,6 @@ from support.code_blocks import ROOT
 from support.ros import Recorder, publisher, wait_until
 
 EXAMPLES = os.path.join(ROOT, 'examples')
-
-
-@pytest.fixture(scope='module', autouse=True)
-def node():
-    rospy.init_node('test_examples')
 
 
 @contextlib.contextmanager

@@ -7,7 +7,6 @@ import contextlib
 import time
 
 import pytest
-import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import Image, PointCloud2
@@ -34,7 +33,6 @@ OUTPUTS = [('/depth_detector_node', '/yolo_bounding_box', Int32MultiArray),
 
 @pytest.fixture(scope='module')
 def pipeline_stage():
-    rospy.init_node('test_faults')
     stage = Stage()
     yield stage
     print('\n' + '\n'.join(stage.rows))

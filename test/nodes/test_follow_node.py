@@ -43,7 +43,6 @@ class Witness(object):
         self._target = message.data
 
     def _on_tracks(self, message):
-        """Note which person of the truth the followed track is."""
         with self._lock:
             truth = self._truth.pop(message.header.stamp.to_nsec(), None)
         followed = [track for track in message.objects if track.id == self._target]
@@ -58,7 +57,6 @@ def position_of(track):
 
 @pytest.fixture(scope='module')
 def witness():
-    rospy.init_node('test_follow_node')
     with launched('simulation.launch', 'scenario:=' + SCENE, 'drive:=true', 'rviz:=false', 'single_process:=true'), \
             launched('follow.launch', 'enabled:=true'):
         witness = Witness()

@@ -6,6 +6,7 @@ import subprocess
 import time
 from unittest import mock
 
+import pytest
 import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
@@ -24,6 +25,11 @@ from support.ros import TIMEOUT_S, Recorder, launched, wait_until
 from support.stage import RECOVERY_IMAGES, Stage
 
 NODES = '/people_node', '/planner_bridge_node'
+
+
+@pytest.fixture(scope='session', autouse=True)
+def ros_node():
+    """Without the master of rostest."""
 
 
 def has_master():
@@ -45,12 +51,10 @@ def master(port):
 
 
 def set_label(label):
-    """As with rosparam set."""
     rosgraph.Master('/somebody').setParam('/test_master/label', label)
 
 
 def wait_for_reports(recorder, node, count):
-    """Wait for this many further reports of a node on /diagnostics."""
     begin = len(recorder.messages)
     wait_until(lambda: count <= sum(status.name.startswith(node) for message in recorder.messages[begin:]
                                     for status in message.status), '%d reports of %s' % (count, node), 40)

@@ -1,6 +1,6 @@
-"""pipeline.launch in one process, with camera_pose:=floor: tracks, and live parameters of its nodes.
+"""pipeline.launch in one process: types of images, and live parameters of its nodes.
 
-Needs a master for a static transform, and for the client and the command of dynamic_reconfigure.
+Needs a master for the client and the command of dynamic_reconfigure.
 """
 import ast
 
@@ -11,15 +11,12 @@ from dynamic_reconfigure.client import Client
 from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.srv import Reconfigure
 from rosgraph_msgs.msg import Log
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import String
 
-from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
-from ros_3d_bb.conversions.perception_msgs import tracks_from_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
-from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.common.reconfigure_server import live_in
 from ros_3d_bb.nodes.common.subscribers import subscribe
 from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams
@@ -27,41 +24,12 @@ from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams
 from ros_3d_bb.visualization.markers import MarkerParams
 from support.compressed import compressed_fields
-from support.rolled_camera import RolledSimulator
 from support.ros import TIMEOUT_S, Recorder, depth_message, publisher, wait_until
 
 LIVE = {'bbox3d_node': live_in([Bbox3dParams]),
         'depth_detector_node': live_in([DepthDetectorParams, DepthPeopleParams]),
         'tracker_node': live_in((TrackerNodeParams, MarkerParams) + TRACKING_PARAMS)}
 NODES = sorted(LIVE)
-
-
-@pytest.fixture(scope='module', autouse=True)
-def node():
-    rospy.init_node('test_people_node')
-
-
-def test_people_are_tracked_above_the_floor_that_is_seen():
-    """Images of a rolled camera without tf."""
-    simulator = RolledSimulator()
-    frames = [simulator.frame(number) for number in range(simulator.frame_count)]
-    pubs = {topic: publisher(topic, kind) for topic, kind in (
-        (INFO_TOPICS[0], CameraInfo), (DEPTH_TOPIC, Image), (COLOR_TOPIC, Image))}
-    tracks, truth_m = Recorder('ros_3d_bb/tracks', TrackedObjectArray), {}
-    start_ns, rate = rospy.get_rostime().to_nsec(), rospy.Rate(10)
-    for frame in frames + frames[::-1]:
-        stamp_ns, messages = simulator.messages(frame._replace(time_s=len(truth_m) / 10.0), start_ns)
-        truth_m[stamp_ns] = np.array([person.position_m[:2] for person in frame.people])
-        for topic, message in messages:
-            if topic in pubs:
-                pubs[topic].publish(message)
-        rate.sleep()
-    tracks.wait_for(1)
-    last = tracks.messages[-1]
-    assert last.header.frame_id == 'map'
-    tracks_m = np.array([track.position_m[:2] for track in tracks_from_msg(last)])
-    apart_m = np.linalg.norm(tracks_m[:, None] - truth_m[last.header.stamp.to_nsec()], axis=2)
-    assert apart_m.shape == (3, 3) and apart_m.min(axis=0).max() < 0.2
 
 
 def test_the_publisher_decides_the_type_of_images():
@@ -83,7 +51,6 @@ def test_the_publisher_decides_the_type_of_images():
 
 @pytest.fixture(scope='module')
 def clients():
-    """dynamic_reconfigure's client of each node."""
     created = {node: Client(node, timeout=TIMEOUT_S) for node in NODES}
     yield created
     for client in created.values():

@@ -1,7 +1,5 @@
 """The pipeline on the bag of a measurement session. Needs a master and the clock of the bag."""
 import numpy as np
-import pytest
-import rospy
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ros_3d_bb.bags.bag_writer import MOUNT_M, START_NS, session_images, write_bag
@@ -11,13 +9,7 @@ from ros_3d_bb.sessions.session_reader import read_session
 from support.ros import Recorder, launched
 
 
-@pytest.fixture(scope='module', autouse=True)
-def node():
-    rospy.init_node('test_pipeline')
-
-
-@pytest.mark.parametrize('single_process', ['false', 'true'])
-def test_playback_tracks_the_person_in_the_map(single_process, session_folder, weights, tmp_path):
+def test_playback_tracks_the_person_in_the_map(session_folder, weights, tmp_path):
     """From the images of a session alone, with the detector.
 
     The person jumps every five images; then a new track is started, which is published from the fourth image on.
@@ -29,7 +21,7 @@ def test_playback_tracks_the_person_in_the_map(single_process, session_folder, w
             Recorder('ros_3d_bb/tracks', TrackedObjectArray, False) as tracks, \
             Recorder('visualization_marker_array', MarkerArray, False) as markers, \
             launched('playback.launch', 'bag:=' + path, 'weights:=' + weights, 'rviz:=false', 'exit_at_end:=true',
-                     'single_process:=' + single_process, 'delay:=10') as process:
+                     'delay:=10') as process:
         process.wait()
     assert len(boxes.messages) > len(frames) / 2
     assert all(message.header.stamp.to_nsec() in frames for message in boxes.messages + tracks.messages)

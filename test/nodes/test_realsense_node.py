@@ -3,7 +3,6 @@ import contextlib
 
 import numpy as np
 import pytest
-import rospy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
@@ -20,7 +19,6 @@ TOPICS = dict({'/tf_static': TFMessage, '/clock': Clock}, **IMAGE_TOPICS)
 
 @pytest.fixture(scope='module')
 def recording(tmp_path_factory):
-    rospy.init_node('test_realsense_node')
     path = str(tmp_path_factory.mktemp('recording') / ('a' + SUFFIX))
     return write_recording(path, [colored(number) for number in range(FRAMES)], [sloping_depth()] * FRAMES)
 
@@ -62,9 +60,3 @@ def test_the_frames_of_the_camera_are_published_once_and_form_a_tree(played):
         'camera_depth_frame': 'camera_link', 'camera_depth_optical_frame': 'camera_depth_frame'}
     ahead = transform_from_msg(links['camera_color_optical_frame'])[:3, 2]
     np.testing.assert_allclose(ahead, (1, 0, 0), atol=1e-12)
-
-
-def test_a_node_that_cannot_start_exits_with_the_reason(recording):
-    process = started('realsense_node', 'file:=/nowhere.bag')
-    output, _none = process.communicate(timeout=30)
-    assert process.returncode == 1 and '/nowhere.bag' in output and 'Traceback' not in output

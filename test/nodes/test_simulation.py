@@ -8,7 +8,6 @@ import os
 
 import pytest
 import rosbag
-import rospy
 import yaml
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image
@@ -31,11 +30,6 @@ TOPICS = {'camera/aligned_depth_to_color/image_raw': Image, 'camera/color/camera
           'camera/aligned_depth_to_color/camera_info': CameraInfo, '/tf': TFMessage, '/clock': Clock,
           'ground_truth': TrackedObjectArray}
 IMAGE_TOPICS = {COLOR} | set(TOPICS) - {'/tf', '/clock'}
-
-
-@pytest.fixture(scope='module', autouse=True)
-def node():
-    rospy.init_node('test_simulation')
 
 
 def recorded(folder, scene, *arguments):

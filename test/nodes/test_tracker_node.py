@@ -3,16 +3,16 @@ import itertools
 import time
 
 import pytest
-import rospy
 from dynamic_reconfigure.client import Client
-from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import OccupancyGrid
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
+from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObject, TrackedObjectArray
+from support.people import mounted
 from support.ros import TIMEOUT_S, Recorder, diagnostics_of, header_at, publisher, wait_until
 from support.two_cameras import boxes
 
@@ -29,11 +29,7 @@ class Rig(object):
         self.tracks = Recorder('ros_3d_bb/tracks', TrackedObjectArray)
 
     def send_tf(self, stamp_ns):
-        transform = TransformStamped(header=header_at(stamp_ns, 'map'), child_frame_id=CAMERA)
-        transform.transform.translation.z = 1.0
-        turn = transform.transform.rotation
-        turn.x, turn.y, turn.z, turn.w = -0.5, 0.5, -0.5, 0.5
-        self.tf.publish(TFMessage([transform]))
+        self.tf.publish(TFMessage(transform_messages(time_from(stamp_ns), [('map', CAMERA, mounted(1.0))])))
 
     def send(self, stamp_ns, *centers):
         """Boxes at camera coordinates (right, down, forward), and the transform at their stamp."""
@@ -46,7 +42,6 @@ class Rig(object):
 
 @pytest.fixture(scope='module')
 def rig():
-    rospy.init_node('test_tracker_node')
     return Rig()
 
 

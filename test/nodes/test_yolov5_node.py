@@ -1,5 +1,4 @@
 """yolov5_node on images of a session. Needs a master because the node processes the newest of a stream of images."""
-import subprocess
 
 import numpy as np
 import pytest
@@ -29,8 +28,6 @@ def images(session_folder):
 
 @pytest.fixture(scope='module')
 def camera(weights):
-    """Publisher of images, to which the node has subscribed."""
-    rospy.init_node('test_yolov5_node')
     with launched('yolov5.launch', 'weights:=' + weights):
         yield publisher('camera/color/image_raw', Image)
 
@@ -104,10 +101,3 @@ def test_changed_parameters_apply_from_the_next_image_on(camera, output, images)
         camera.publish(color_message(images[0][0], START + number))
         assert len(boxes2d_from_msg(output.wait_for(number + 1)[-1]).boxes) == count
     client.close()
-
-
-def test_a_node_that_cannot_start_exits_with_the_reason(camera):
-    result = subprocess.run(['rosrun', 'ros_3d_bb', 'yolov5_node', '__name:=missing', '_weights:=/nowhere/yolov5n.pt'],
-                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=60)
-    output = result.stdout.decode()
-    assert result.returncode == 1 and '/nowhere/yolov5n.pt' in output and 'Traceback' not in output

@@ -1,6 +1,5 @@
 """Checkpoints with random weights in the official format: pickled instances of classes of `models`."""
 import contextlib
-import inspect
 import sys
 import types
 
@@ -35,11 +34,6 @@ def write_checkpoint(path, layout, yaml=None, root='Model', anchor_grid=False):
         for module in network.modules():
             module.__class__ = ours.get(type(module), type(module))
     return network.float()
-
-
-def supported(function, **options):
-    """The options that a function has in the installed version of torch."""
-    return {name: value for name, value in options.items() if name in inspect.signature(function).parameters}
 
 
 def random_network(layout, seed=0):

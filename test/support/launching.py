@@ -34,7 +34,6 @@ GAZEBO_ARGUMENTS = {
 
 
 def write(path, text):
-    """Write a file and create its folders."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text)
 
@@ -52,7 +51,6 @@ def write_package(folder, name):
 
 
 def stand_in_gazebo(folder):
-    """Stand-ins for the packages of Gazebo and Jackal."""
     for name, arguments in GAZEBO_ARGUMENTS.items():
         stand_in_launch_file(folder, name, arguments, '<param name="robot_description" value="bare"/>')
     write(folder / 'jackal_description' / 'urdf' / 'jackal.urdf.xacro', JACKAL_TO_BE_EXTENDED)

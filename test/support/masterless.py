@@ -53,7 +53,6 @@ class Connections(object):
         self.now = genpy.Time(1)
 
     def send(self, topic, message):
-        """Call the callback of a topic."""
         message._connection_header = {'callerid': 'test'}  # required by tf2's listener
         self.subscribers[topic].callback(message)
 

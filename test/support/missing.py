@@ -1,5 +1,4 @@
 """Tests that need packages of requirements.txt, which a machine with only the dependencies of package.xml lacks."""
-import ast
 import importlib.util
 import os
 import re
@@ -23,22 +22,6 @@ def missing_requirements():
         with open(os.path.join(TEST, name)) as stream:
             names.update(re.findall(r'^(?!pytest)([\w-]+)', stream.read(), re.MULTILINE))
     return set(filter(is_missing, (name.replace('-', '_') for name in names)))
-
-
-def imports_when_loaded(path):
-    """Modules that a test file imports, also by modules of test/support."""
-    with open(path) as stream:
-        body = ast.parse(stream.read()).body
-    names = [name.name for node in body if isinstance(node, ast.Import) for name in node.names]
-    for node in body:
-        if isinstance(node, ast.ImportFrom):
-            names += [node.module] + ['%s.%s' % (node.module, name.name) for name in node.names]
-    found = set(name.split('.')[0] for name in names)
-    for name in names:
-        helper = os.path.join(TEST, *name.split('.')) + '.py'
-        if name.startswith('support.') and os.path.exists(helper):
-            found |= imports_when_loaded(helper)
-    return found
 
 
 def missing_for(item):

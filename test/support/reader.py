@@ -70,7 +70,6 @@ class Reader(object):
         (self.cache / 'venv' / 'installed').write_text('%s  -\n' % sha1(wanted).hexdigest())  # the format of sha1sum
 
     def environment(self, **more):
-        """Environment variables of the user, and more."""
         return dict(self._environment, **more)
 
     def typed(self, block, replaced=(), appended=''):
@@ -123,7 +122,6 @@ class Graph(object):
         return process
 
     def output(self):
-        """Output of all processes."""
         texts = []
         for _process, path in self._started:
             with open(path, errors='replace') as stream:
@@ -150,7 +148,6 @@ class Graph(object):
             assert status == 0, 'nothing on %s\n%s' % (topic, self.output())
 
     def shows(self, title):
-        """Wait for a window with this title."""
         self.waits(lambda: subprocess.call(['xdotool', 'search', '--onlyvisible', '--name', title],
                                            env=self.environment, stdout=subprocess.DEVNULL) == 0, 'window ' + title)
 

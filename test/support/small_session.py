@@ -39,7 +39,6 @@ def write_measurement(folder, name):
 
 
 def read_json(folder):
-    """The content of frames.json."""
     with open(os.path.join(str(folder), 'frames.json')) as stream:
         return json.load(stream)
 

@@ -64,7 +64,6 @@ class Stage(object):
         self.publish_time(self.now_ns)
 
     def publish_time(self, time_ns):
-        """Publish a time on /clock once."""
         self._clock_pub.publish(Clock(time_from(time_ns)))
 
     def pause(self, seconds, speed=10.0):

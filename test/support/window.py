@@ -108,7 +108,6 @@ class Driver(object):
         raise AssertionError('timeout')
 
     def settle(self):
-        """Process pending events."""
         for _ in range(5):
             QtWidgets.QApplication.processEvents()
 

@@ -5,16 +5,10 @@ import numpy as np
 import pytest
 
 from conftest import DATA
-from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.estimation.box3d import plausible
-from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
+from ros_3d_bb.estimation.box3d_estimator import estimator_named
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb_lab.evaluation.accuracy import Estimates, boxes_of, compare, scores_of
-from ros_3d_bb_lab.evaluation.defaults import scenario_path
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
-from ros_3d_bb_lab.simulation.scenario import read_scenario
-from ros_3d_bb_lab.simulation.simulator import LEAST_SHOWN, Simulator
 
 REAL_WEIGHTS = pytest.mark.needs(*['torch'] * bool(DATA))
 PLACES = np.repeat([(0.0, 1.0), (0.5, 2.0), (-1.0, 3.0)], 4, axis=0)
@@ -58,28 +52,3 @@ def test_positions_are_accurate(result):
     assert 0.92 <= ours['coverage_95'] <= (0.98 if DATA else 1.0)
     if DATA:
         assert ours['rmse_x_truncated_m'] <= 0.045 and ours['missed'] <= 3
-
-
-def position_errors_m(simulator, estimator):
-    """Errors in the plane of each seventh image with exact boxes, people at 1 to 6 m; NaN without an estimate."""
-    errors_m = []
-    for frame in map(simulator.frame, range(0, simulator.frame_count, 7)):
-        people = [person for person in frame.people if person.visible >= LEAST_SHOWN]
-        boxes = estimate_boxes(DepthImage(frame.depth_mm, 0.001), [person.box_px for person in people],
-                               simulator.camera, estimator)
-        for person, box in zip(people, boxes):
-            x_m, _y, z_m = transform_points(np.linalg.inv(frame.poses.map_from_camera), person.position_m)
-            if 1 <= z_m <= 6:
-                errors_m.append(np.hypot(box.center_m[0] - x_m, box.center_m[2] - z_m) if plausible(box) else np.nan)
-    return np.array(errors_m)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('scene', ['behind_a_pillar', 'thesis_f_in_front'])
-def test_positions_are_accurate_despite_occlusion_and_background(scene):
-    """In these scenes, the error of the thesis' median often exceeds 0.4 m."""
-    simulator = Simulator(read_scenario(scenario_path(scene)))
-    ours, median = (position_errors_m(simulator, estimator_named(name)) for name in ('foreground', 'median'))
-    assert len(ours) > 20 and not np.isnan(ours).any() and ours.max() < 0.4
-    assert np.sqrt(np.mean(ours ** 2)) < 0.08
-    assert np.count_nonzero(median > 0.4) > 3

@@ -1,13 +1,15 @@
-"""Annotation of a session: edits are saved immediately, can be undone, and keep changes by other programs."""
+"""Annotation of a session: edits, which are saved immediately and can be undone, estimates, and invalid sessions."""
 import os
 
+import cv2
+import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.sessions.session_reader import SessionError, read_session
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.measurement import Mark
+from ros_3d_bb_annotator.validation import problems_of
 from support.small_session import (FAR_BOX, NEAR_BOX, NEAR_MM, change_json, read_json, write_measurement,
                                    write_small_session)
 
@@ -107,3 +109,72 @@ def test_the_truth_belongs_to_the_nearest_box_unless_one_was_selected(document):
     document.choose_person(1, 1)
     document.set_truths([1], 0.72, 2.9)  # no other person can be there
     assert document.measurements[1].truths == {1: (0.72, None, 2.9)}
+
+
+def test_a_box_drawn_by_hand_is_estimated_and_chosen(document, folder):
+    change_json(folder, lambda content: content['frames'][0]['detections'].pop(0))
+    document.refresh()
+    box = document.add_box(0, NEAR_BOX)
+    drawn = document.measurements[0].detections[-1]
+    assert document.measurements[0].person == 1 and drawn.by_hand and drawn.box_px == NEAR_BOX
+    assert box.center_m[2] == pytest.approx(NEAR_MM / 1000.0 + 0.09)  # the axis is behind the surface
+    assert np.abs(drawn.estimate_m - box.center_m).max() < 1e-5
+    assert drawn.support == pytest.approx(box.support, abs=1e-3) and drawn.truncated == box.truncated
+    assert read_session(folder).frames[0].boxes_px == (NEAR_BOX, FAR_BOX)
+
+
+def test_a_box_drawn_by_hand_replaces_that_of_the_same_person(document, folder):
+    change_json(folder, lambda content: content['frames'][0]['detections'][0].update(box=[10, 4, 26, 30]))
+    document.refresh()
+    assert document.add_box(0, (-5, 4, 26, 44)) is not None
+    assert document.measurements[0].detections[-1].box_px == (0, 4, 26, 44)
+    assert document.add_box(0, NEAR_BOX).center_m[2] == pytest.approx(2.09)
+    assert read_session(folder).frames[0].boxes_px == (NEAR_BOX, FAR_BOX)
+
+
+@pytest.mark.parametrize('break_it', [
+    lambda document: os.remove(document.measurements[0].depth_path),
+    lambda document: cv2.imwrite(document.measurements[0].depth_path, np.zeros((48, 64), np.uint16))])
+def test_truth_can_be_entered_for_a_box_that_cannot_be_estimated(document, folder, break_it):
+    change_json(folder, lambda content: content['frames'][0]['detections'][0].pop('estimate_mm'))
+    document.refresh()
+    break_it(document)
+    document.set_truths([0], 0.1, 2.0)
+    assert document.measurements[0].truth_m == (0.1, None, 2.0) and document.known_errors(0) is None
+
+
+def test_a_missing_image_is_named_and_other_measurements_can_be_annotated(folder):
+    os.remove(os.path.join(folder, 'depth', 'm1.png'))
+    os.remove(os.path.join(folder, 'color', 'm1.png'))
+    document = Document.open(folder)
+    assert [measurement.problem for measurement in document.measurements] == [
+        None, 'there is no file color/m1.png and no file depth/m1.png', None, None]
+    for read in (document.color, document.depth):
+        with pytest.raises(SessionError, match='m1.png: missing'):
+            read(1)
+    document.reject([1], 'no images')
+    document.set_truths([2], -0.5, 2.1)
+    assert list(problems_of(document)) == []
+
+
+@pytest.mark.parametrize('break_it,problem', [
+    (lambda entry: entry.pop('id'), "'id' is missing"), (lambda entry: entry.update(person=2), 'person is 2'),
+    (lambda entry: entry['detections'][0].update(box=[1, 2, 3]), '[1, 2, 3]'),
+    (lambda entry: entry.update(truth_mm={'x': 1, 'z': 'far'}), 'far'),
+    (lambda entry: entry.update(stamp='yesterday'), 'stamp is'), (lambda entry: entry.update(detections=5), 'int')])
+def test_an_invalid_entry_is_shown_with_its_fault(folder, break_it, problem):
+    change_json(folder, lambda content: break_it(content['frames'][1]))
+    document = Document.open(folder)
+    assert problem in document.measurements[1].problem and document.measurements[1].state == 'new'
+    assert problem in list(problems_of(document))[0]
+    for edit in (lambda: document.color(1), lambda: document.set_truths([1], 0.1, 2.0)):
+        with pytest.raises(SessionError):
+            edit()
+    document.set_truths([2], 0.1, 2.0)
+    assert read_json(folder)['frames'][2]['truth_mm'] == {'x': 100, 'z': 2000}
+
+
+def test_a_session_with_an_invalid_grid_is_rejected(folder):
+    change_json(folder, lambda content: content.update(grid=[{'name': 'A', 'x': float('nan'), 'z': 1}]))
+    with pytest.raises(SessionError, match='frames.json'):
+        Document.open(folder)

@@ -1,11 +1,16 @@
-"""Table of a session as CSV."""
+"""Table of a session as CSV, and the annotator's command line: analysis and validation without a window, Qt and ROS."""
 import csv
+import json
+import os
 
 import pytest
 
+from ros_3d_bb.estimation.error_model import read_error_model
+from ros_3d_bb_annotator.command_line import main
 from ros_3d_bb_annotator.export import export
 from ros_3d_bb_lab.evaluation.noise.tables import read_table
-from support.small_session import NEAR_BOX
+from support.small_session import NEAR_BOX, change_json, write_small_session
+from support.synthetic_session import write_synthetic_session
 
 
 def test_a_row_contains_box_estimates_and_truth_in_all_axes(document, tmp_path):
@@ -23,3 +28,36 @@ def test_a_row_contains_box_estimates_and_truth_in_all_axes(document, tmp_path):
     assert [float(row[axis + ' true']) for axis in 'XYZ'] == [-500, 10, 2100.4]
     assert float(row['Z error']) == pytest.approx(1000 * z_m - 2100.4, abs=0.06)
     assert read_table(path, 'Z').truth_m.tolist() == [[-0.5, 2.1004]]
+
+
+@pytest.fixture
+def annotated_folder(tmp_path):
+    """Session whose truth differs from the estimates by 0.1 m."""
+    write_small_session(str(tmp_path))
+    change_json(str(tmp_path), lambda content: [entry.update(truth_mm={'x': -466.5, 'z': 2100})
+                                                for entry in content['frames']])
+    return str(tmp_path)
+
+
+@pytest.mark.slow
+def test_the_output_folder_and_the_estimator_of_the_analysis_can_be_chosen(tmp_path, capsys):
+    session, out = write_synthetic_session(str(tmp_path / 'session')), str(tmp_path / 'out')
+    assert main(['--analyse', session, '--out', out, '--estimator', 'recorded']) == 0
+    text = capsys.readouterr().out
+    assert 'f(z) = ' in text and 'report: %s' % os.path.join(out, 'report.html') in text
+    assert {'report.html', 'summary.json', 'error_model.yaml', 'z_error.png'} <= set(os.listdir(out))
+    with open(os.path.join(out, 'summary.json')) as stream:
+        assert len(json.load(stream)['z']['clusters']) == 6
+    assert read_error_model(os.path.join(out, 'error_model.yaml')).provenance.estimator == 'recorded'
+
+
+@pytest.mark.parametrize('break_it,problem', [
+    (lambda entry: entry['detections'][0].update(box=[10, 4, 26, 49]), 'box (10, 4, 26, 49) is not inside the image'),
+    (lambda entry: entry.update(truth_mm={'x': -466.5, 'z': 3600}), 'is implausible'),
+    (lambda entry: entry.update(detections=[]), 'nobody was found')])
+def test_problems_are_listed(annotated_folder, capsys, break_it, problem):
+    change_json(annotated_folder, lambda content: break_it(content['frames'][1]))
+    assert main(['--validate', annotated_folder]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith('m1: ') and problem in '\n'.join(lines)
+    assert lines[-1].endswith((' 1 problem', ' 2 problems'))

@@ -13,7 +13,7 @@ from ros_3d_bb.tracking.measurement_model import BoxNoise, Kinds, measurements_o
 from ros_3d_bb.tracking.track import Track
 from ros_3d_bb.tracking.tracker import TrackerParams
 from ros_3d_bb.tracking.types import CameraView, Detection
-from support.cylinders import mounted
+from support.people import mounted
 
 KINDS, VIEW = Kinds(ObjectClasses()), CameraView(mounted(1.0))
 SEEDS = st.integers(0, 2 ** 32 - 1)

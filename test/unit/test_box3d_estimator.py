@@ -57,16 +57,6 @@ def test_no_estimate_without_valid_depth(depth, scale_m, dtype):
         assert estimate_boxes(image, [(0, 0, 64, 48)], CAMERA, estimator_named(name)) == outside == [None]
 
 
-def test_support_is_the_share_of_samples_with_depth_that_are_on_the_body():
-    depth = flat(2000)
-    depth.values[:, 40:] = 4000
-    depth.values[:10] = 0
-    rect = (0, 0, 64, 48)
-    box = estimate_median(sample_depth(depth, rect, 1), rect, of(CAMERA))
-    assert box.center_m[2] == pytest.approx(2.0)
-    assert box.support == pytest.approx(40 / 64)
-
-
 def foreground(depth, rect, *others, camera=CAMERA):
     """The box of the first of several rectangles."""
     rects = [rect] + list(others)
@@ -191,8 +181,3 @@ def test_no_estimate_at_right_angles_to_the_axis_of_a_fisheye(name):
     estimator, rect = estimator_named(name), (10, 200, 60, 280)
     depth = DepthImage(np.full((480, 640), 2.0), 1.0)
     assert estimator.estimate(depth, [rect], of(camera), [PERSON_CLASS]) == [None]
-
-
-def test_a_rectangle_beyond_the_image_of_a_distorting_lens_has_an_estimate():
-    rect = (-2 ** 31, 100, 300, 2 ** 31 - 1)
-    assert np.isfinite(foreground(DepthImage(np.full((480, 640), 2.0), 1.0), rect, camera=WIDE).center_m).all()

@@ -8,14 +8,14 @@ from hypothesis import given, strategies as st
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.association import plane_distances
-from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
+from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE
 from ros_3d_bb_lab.evaluation.clear_mot import GATE_M, Moment, score
 from ros_3d_bb_lab.evaluation.tracking.metrics import trackeval_data, trackeval_metrics
+from support.tracks import track_at
 
 
 def at(number, x, y, status=VISIBLE):
-    zero = np.zeros(3)
-    return TrackedObject(number, np.array([x, y, 0.9]), zero, zero, zero, status, False, 0, 0, np.zeros((0, 3)), 0.25)
+    return track_at([x, y, 0.9], [0, 0, 0], number=number)._replace(status=status)
 
 
 def moments(*images):

@@ -4,22 +4,20 @@ import pytest
 
 from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.planning.cost_grid import ACROSS, CELL_M, COMFORT_M, HALF_SIZE_M, HIGHEST, RISKY, presence_costs
-from ros_3d_bb.tracking.types import VISIBLE, TrackedObject
+from support.tracks import STEP_S, track_at
 
 WIDTH_M = 0.5
 RADIUS_M = WIDTH_M / 2 + COMFORT_M
 ROBOT_RADIUS_M = 0.35
 
 
-def walking(position_m, velocity_mps, stds_m=(0.0, 0.0), moving=True):
+def walking(position_m, velocity_mps, stds_m=(0.0, 0.0)):
     """A track whose standard deviation grows linearly from now to the end of the prediction of 2 s."""
-    position_m, velocity_mps = np.array(position_m + (0.85,)), np.array(velocity_mps + (0.0,))
-    times_s = 0.25 * np.arange(9)
-    covariances_m2 = np.interp(times_s, (0, 2), stds_m)[:, np.newaxis, np.newaxis] ** 2 * np.eye(3)
+    covariances_m2 = np.interp(STEP_S * np.arange(9), (0, 2), stds_m)[:, np.newaxis, np.newaxis] ** 2 * np.eye(3)
     covariance = np.zeros((6, 6))
     covariance[:3, :3] = covariances_m2[0]
-    return TrackedObject(1, position_m, np.array([WIDTH_M, WIDTH_M, 1.7]), velocity_mps, velocity_mps, VISIBLE, moving,
-                         0, 0, position_m + np.outer(times_s[1:], velocity_mps), 0.25, covariance, covariances_m2[1:])
+    return track_at(position_m + (0.85,), velocity_mps + (0.0,), covariance=covariance)._replace(
+        prediction_covariance_m2=covariances_m2[1:])
 
 
 def cost_at(costs, x_m, y_m):

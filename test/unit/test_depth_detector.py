@@ -7,10 +7,9 @@ from conftest import DATA
 from ros_3d_bb.camera.camera_model import Camera, transform_points
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb.detection.depth import detector as depth_people
 from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.depth.ground_plane import Floor, floor_from_transform
-from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams, find_person_clusters, grid_of
+from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb_lab.evaluation.defaults import scenario_path
 from ros_3d_bb_lab.simulation.scenario import read_scenario
@@ -67,13 +66,6 @@ class Room(object):
         noise_m = noise * self.depth_m ** 2 * np.random.RandomState(2).randn(*self.depth_m.shape)
         color = cv2.GaussianBlur(self.color, (0, 0), 1.0)
         return color, DepthImage(np.clip((self.depth_m + noise_m) * 1000, 0, 65535).astype(np.uint16), 0.001)
-
-    def cluster_boxes(self):
-        """Boxes of the clusters before classification, from left to right."""
-        depth, params = self.images()[1], DepthPeopleParams()
-        grid = grid_of(depth, self.camera, self.floor, params)
-        return sorted(depth_people.box_of(blob, shape, grid, self.camera, self.floor)
-                      for blob, shape in find_person_clusters(grid, self.camera, params))
 
     def detections(self, floor='given', in_metres=False, **params):
         color, depth = self.images()
@@ -136,15 +128,6 @@ def test_the_box_of_a_person_with_hidden_legs_extends_to_the_floor(number):
     overlaps = iou(person.box_px, boxes)
     assert overlaps.max() > 0.6
     assert boxes[overlaps.argmax(), 3] == pytest.approx(simulator.camera.project(feet_m[None])[0, 1], abs=3)
-
-
-@pytest.mark.parametrize('one, other', [((0.0, 3.0), (0.4, 3.5)), ((0.0, 3.0), (0.4, 3.7)), ((0.0, 3.0), (0.4, 4.0)),
-                                        ((-0.28, 3.5), (0.28, 3.5))])
-def test_overlapping_people_are_separated_by_depth_or_by_their_heads(one, other):
-    room = Room()
-    left, right = [room.visible(person) for person in (room.person(*one), room.person(*other))]
-    assert right[0] <= left[2]
-    assert_boxes(room.cluster_boxes(), [left, right])
 
 
 @pytest.mark.parametrize('x,z,low,high,half_width', [

@@ -6,20 +6,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
 from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.tracking.measurement_model import DEFAULT_RANGE_M, learned_range
 from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.types import VISIBLE, CameraView, Detection
+from ros_3d_bb.tracking.types import VISIBLE, Detection
 from ros_3d_bb_lab.evaluation.noise import __main__ as command
 from ros_3d_bb_lab.evaluation.noise.recordings import fit_recordings, lasting_errors
 from ros_3d_bb_lab.evaluation.tracking.recorded_detections import RecordedRun
 from ros_3d_bb_lab.evaluation.tracking.run_generator import Image, RunTruth
+from support.people import VIEW, at
 
-CAMERA = Camera(640, 480, 533.0, 533.0, 319.5, 239.5)
-VIEW = CameraView(transform_from((0, 0, 1), OPTICAL_ROTATION), CAMERA)
 SIZE_M = np.array([0.5, 0.5, 1.7])
 PERIOD_S = 0.1
 LASTING_M, TIME_S, INDEPENDENT_M, PROBABILITY, RANGE_M = 0.06, 0.4, 0.03, 0.9, 12.0
@@ -93,15 +91,13 @@ def test_the_range_is_learned_from_people_farther_away():
     assert range_m == pytest.approx(16.0, abs=0.1)
 
 
-def leave(detector, distance_m, others_m=()):
-    """A person stands there for two seconds, at times with others, and is then not detected. Returns the time for which
-    the track is published."""
+def leave(detector, distance_m):
+    """A person stands there for two seconds and is then not detected. Returns how long the track is published."""
     tracker = Tracker(detector=detector)
     for number in range(120):
-        places_m = [(distance_m, 0, 0.85)] + [(x_m, 2, 0.85) for x_m in others_m]
-        boxes = [Detection(np.array(place_m), SIZE_M, 0.0016 * np.eye(3)) for place_m in places_m]
-        tracks = tracker.update(NS + number * NS // 30, boxes if number < 60 else boxes[1:], VIEW)
-        if number > 60 and not [track for track in tracks if abs(track.position_m[1]) < 1]:
+        boxes = [at(distance_m, 0)]
+        tracks = tracker.update(NS + number * NS // 30, boxes if number < 60 else [], VIEW)
+        if number > 60 and not tracks:
             return (number - 60) / 30.0
     return np.inf
 

@@ -129,12 +129,6 @@ def test_there_are_no_rays_and_images_beyond_a_fold_of_the_polynomial():
     assert np.isfinite(camera.project((0.9, 0, 1))).all() and np.isnan(camera.project((0.93, 0, 1))).all()
 
 
-def test_a_fisheye_has_no_rays_at_right_angles_to_its_axis():
-    camera = Camera(640, 640, 200, 200, 320, 320, EQUIDISTANT, (0, 0, 0, 0))
-    assert np.isfinite(camera.deproject((320 + 200 * np.pi / 2 * 0.98, 320), 1.0)).all()
-    assert np.isnan(camera.deproject((320 + 200 * np.pi / 2 * 1.01, 320), 1.0)[:2]).all()
-
-
 @pytest.mark.parametrize('model,given,kept', [
     ('', (), ()), ('none', (0,) * 5, ()), (RATIONAL_POLYNOMIAL, (0,) * 5, ()), (EQUIDISTANT, (0,) * 5, (0,) * 4),
     (PLUMB_BOB, (0.1, 0, 0, 0), (0.1, 0, 0, 0, 0)), (PLUMB_BOB, (0.1, 0, 0, 0, 0.2, 0), (0.1, 0, 0, 0, 0.2))])

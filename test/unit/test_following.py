@@ -47,14 +47,6 @@ def test_a_hidden_person_is_lost_after_a_second_and_found_by_the_same_id():
     assert selected(selector, 3.0, person(1, 3, 0), person(2, 2, 0)) == 1
 
 
-def test_a_track_that_is_missing_for_a_moment_is_kept():
-    selector = TargetSelector()
-    selected(selector, 1, person(1, 3, 0), person(2, 2, 3))
-    assert selected(selector, 1.9, person(2, 2, 3)) == 1
-    assert selected(selector, 2.1, person(2, 2, 3)) is None
-    assert selected(selector, 2.2, person(1, 3, 0), person(2, 2, 3)) == 1
-
-
 def test_a_person_from_before_a_jump_of_the_clock_is_not_followed():
     selector = TargetSelector()
     selected(selector, 100, person(1, 3, 0))

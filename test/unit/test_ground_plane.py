@@ -7,7 +7,7 @@ from ros_3d_bb.camera.camera_model import Camera, transform_points
 from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.detection.depth.ground_plane import MAX_HIGHER, FittedFloor, Floor, fit_floor, floor_from_transform
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
-from support.cylinders import mounted
+from support.people import mounted
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 V, U = np.mgrid[:CAMERA.height, :CAMERA.width]

@@ -4,69 +4,49 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
-from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.ignored_areas import OccupiedCells, polygons_from
 from ros_3d_bb.tracking.measurement_model import NoiseParams
 from ros_3d_bb.tracking.track import PredictionParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
-from ros_3d_bb.tracking.types import CameraView, Detection
+from support.people import at, ids, play, standing
 
 SQUARE = '[[[3, -0.5], [4, -0.5], [4, 0.5], [3, 0.5]]]'
-VIEW = CameraView(transform_from((0, 0, 1), OPTICAL_ROTATION), Camera(640, 480, 533.0, 533.0, 319.5, 239.5))
 
 
-def play(tracker, start_s, seconds, *places_at):
-    """IDs of the tracks in each image, 10 times per second, of people at `places_at` (functions of time)."""
-    found = []
-    for time_s in np.arange(start_s, start_s + seconds, 0.1):
-        detections = [Detection([x, y, 0.85], [0.5, 0.5, 1.7], np.eye(3) * 0.04 ** 2)
-                      for x, y in (place_at(time_s) for place_at in places_at)]
-        found.append([track.id for track in tracker.update(int(time_s * NS), detections, VIEW)])
-    return found
-
-
-def at(x, y):
-    return lambda _time_s: (x, y)
+def ids_among(tracker, start_s, seconds, *places):
+    """IDs of the tracks in each image, 10 times per second, of people who stand at places (x, y)."""
+    return list(map(ids, play(tracker, seconds, standing(*places), 10, start_s)))
 
 
 def test_no_track_starts_in_a_polygon_and_others_do():
-    assert play(Tracker(TrackerParams(ignored_areas=SQUARE)), 1, 2, at(3.5, 0.2), at(3.5, 0.8))[-1] == [1]
-    assert play(Tracker(), 1, 2, at(3.5, 0.2), at(3.5, 0.8))[-1] == [1, 2]
+    assert ids_among(Tracker(TrackerParams(ignored_areas=SQUARE)), 1, 2, (3.5, 0.2), (3.5, 0.8))[-1] == [1]
+    assert ids_among(Tracker(), 1, 2, (3.5, 0.2), (3.5, 0.8))[-1] == [1, 2]
 
 
 def test_a_tracked_person_who_walks_through_keeps_the_id():
-    found = play(Tracker(TrackerParams(ignored_areas=SQUARE)), 1, 4, lambda time_s: (3.5, 1.8 - 0.9 * (time_s - 1)))
-    assert found[8:] == [[1]] * 32
+    found = play(Tracker(TrackerParams(ignored_areas=SQUARE)), 4, lambda time_s: [at(3.5, 1.8 - 0.9 * time_s)], 10)
+    assert list(map(ids, found[8:])) == [[1]] * 32
 
 
 def test_a_new_area_ends_the_tracks_in_it_and_keeps_the_others():
     tracker = Tracker()
-    assert play(tracker, 1, 2, at(3.5, 0.2), at(3.5, 1.2))[-1] == [1, 2]
+    assert ids_among(tracker, 1, 2, (3.5, 0.2), (3.5, 1.2))[-1] == [1, 2]
     tracker.reconfigure(TrackerParams(acceleration=0.1), NoiseParams(), PredictionParams())
-    assert play(tracker, 3, 1, at(3.5, 0.2), at(3.5, 1.2))[-1] == [1, 2]
+    assert ids_among(tracker, 3, 1, (3.5, 0.2), (3.5, 1.2))[-1] == [1, 2]
     tracker.reconfigure(TrackerParams(ignored_areas=SQUARE), NoiseParams(), PredictionParams())
-    assert play(tracker, 4, 1, at(3.5, 0.2), at(3.5, 1.2)) == [[2]] * 10
-
-
-def test_of_a_poster_on_a_wall_and_a_person_before_it_one_is_a_person():
-    wall = np.zeros((60, 60), bool)
-    wall[:, 40] = True  # x from 4.0 to 4.1 of the map
-    tracker = Tracker()
-    tracker.set_map(OccupiedCells(wall, 0.1, (0.0, -3.0, 0.0)))
-    assert play(tracker, 1, 2, at(4.25, 0.0), at(3.7, -0.8))[-1] == [1]
+    assert ids_among(tracker, 4, 1, (3.5, 0.2), (3.5, 1.2)) == [[2]] * 10
 
 
 def test_the_first_map_ends_the_tracks_on_it_and_later_ones_do_not():
     tracker, wall = Tracker(), np.ones((10, 10), bool)
-    assert play(tracker, 1, 2, at(3.5, 0.2))[-1] == [1]
+    assert ids_among(tracker, 1, 2, (3.5, 0.2))[-1] == [1]
     tracker.set_map(OccupiedCells(~wall, 0.1, (3.0, 0.0, 0.0)))
     tracker.set_map(OccupiedCells(wall, 0.1, (3.0, 0.0, 0.0)))
-    assert play(tracker, 3, 1, at(3.5, 0.2))[-1] == [1]
+    assert ids_among(tracker, 3, 1, (3.5, 0.2))[-1] == [1]
     tracker = Tracker()
-    play(tracker, 1, 2, at(3.5, 0.2))
+    ids_among(tracker, 1, 2, (3.5, 0.2))
     tracker.set_map(OccupiedCells(wall, 0.1, (3.0, 0.0, 0.0)))
-    assert play(tracker, 3, 1, at(3.5, 0.2))[-1] == []
+    assert ids_among(tracker, 3, 1, (3.5, 0.2))[-1] == []
 
 
 @given(st.floats(-3, 3), st.floats(-5, 5), st.floats(-5, 5), st.integers(0, 11), st.integers(0, 7))

@@ -10,7 +10,7 @@ from ros_3d_bb.tracking.kalman_filter import outlier_model, predict, update
 from ros_3d_bb.tracking.tracker import TrackerParams
 from support.states import covariance_of, mean_of, state_of
 
-OUTLIERS, NONE = outlier_model(TrackerParams()), outlier_model(TrackerParams(outlier_share=0.0))
+OUTLIERS = outlier_model(TrackerParams())
 SECONDS = st.floats(0.01, 2)
 
 

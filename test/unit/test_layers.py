@@ -11,7 +11,8 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 SOURCE, ANNOTATOR = os.path.join(ROOT, 'src'), os.path.join(ROOT, 'annotator', 'ros_3d_bb_annotator')
 
 # folder: (folders that it may import, libraries beside numpy and Python's own); each folder imports itself.
-# `core` is ros_3d_bb.core, `lab.evaluation` is ros_3d_bb_lab.evaluation, `msg` the generated messages.
+# `core` is ros_3d_bb.core, `lab.evaluation` is ros_3d_bb_lab.evaluation, `msg` the generated messages; `messages` and
+# `ros` are the sets of libraries below.
 ALLOWED = {
     'ros_3d_bb.core': ('', 'yaml'),
     'ros_3d_bb.camera': ('core', 'cv2'),
@@ -21,62 +22,45 @@ ALLOWED = {
     'ros_3d_bb.detection.onnx': ('core detection', 'onnxruntime yaml'),
     'ros_3d_bb.detection.yolov5': ('core detection detection.onnx', 'onnxruntime torch'),
     'ros_3d_bb.detection.depth': ('core detection', 'cv2'),
-    'ros_3d_bb.conversions': (
-        'camera core estimation msg tracking',
-        'cv2 genpy geometry_msgs nav_msgs sensor_msgs std_msgs tf2_msgs'),
-    'ros_3d_bb.planning': ('camera conversions core tracking', 'nav_msgs sensor_msgs std_msgs'),
-    'ros_3d_bb.visualization': (
-        'camera core estimation tracking',
-        'cv2 genpy geometry_msgs std_msgs visualization_msgs'),
+    'ros_3d_bb.conversions': ('camera core estimation msg tracking', 'cv2 messages'),
+    'ros_3d_bb.planning': ('camera conversions core tracking', 'messages'),
+    'ros_3d_bb.visualization': ('camera core estimation tracking', 'cv2 messages'),
     'ros_3d_bb.sessions': ('camera core detection estimation', 'cv2'),
     'ros_3d_bb.drivers': ('camera core', 'pyrealsense2'),
     'ros_3d_bb.pipeline': (
         'camera conversions core detection detection.depth detection.yolov5 estimation tracking visualization',
-        'genpy sensor_msgs std_msgs tf2_msgs tf2_ros'),
-    'ros_3d_bb.bags': (
-        'camera conversions core detection.yolov5 pipeline sessions',
-        'genpy rosbag sensor_msgs std_msgs tf2_msgs tf2_ros yaml'),
-    'ros_3d_bb.diagnosis': (
-        'bags camera conversions core detection.depth msg pipeline',
-        'genpy sensor_msgs std_msgs tf2_msgs tf2_ros yaml'),
-    'ros_3d_bb.nodes.common': (
-        'camera conversions core diagnosis msg pipeline planning visualization',
-        'diagnostic_msgs dynamic_reconfigure genpy rosgraph rosgraph_msgs rospkg rospy '
-        'sensor_msgs std_msgs std_srvs tf2_ros'),
+        'messages tf2_ros'),
+    'ros_3d_bb.bags': ('camera conversions core detection.yolov5 pipeline sessions', 'messages rosbag tf2_ros yaml'),
+    'ros_3d_bb.diagnosis': ('bags camera conversions core detection.depth msg pipeline', 'messages tf2_ros yaml'),
+    'ros_3d_bb.nodes.common': ('camera conversions core diagnosis msg pipeline planning visualization', 'ros'),
     'ros_3d_bb.nodes': (
         'bags camera conversions core detection detection.depth detection.yolov5 diagnosis drivers msg nodes.common '
-        'pipeline planning sessions tracking visualization',
-        'actionlib_msgs geometry_msgs nav_msgs rosgraph rosgraph_msgs rospy sensor_msgs std_msgs std_srvs tf2_ros '
-        'visualization_msgs'),
+        'pipeline planning sessions tracking visualization', 'ros'),
     'ros_3d_bb_lab.simulation': ('camera core tracking', 'cv2 yaml'),
-    'ros_3d_bb_lab.simulation.ros': (
-        'bags camera conversions core msg nodes.common lab.simulation',
-        'geometry_msgs nav_msgs rosgraph_msgs rospy sensor_msgs std_msgs tf2_msgs'),
+    'ros_3d_bb_lab.simulation.ros': ('bags camera conversions core msg nodes.common lab.simulation', 'ros'),
     'ros_3d_bb_lab.evaluation.baselines': ('camera core tracking', 'norfair'),
     'ros_3d_bb_lab.evaluation': (
         'camera core detection detection.depth detection.yolov5 estimation sessions tracking '
-        'lab.evaluation.baselines lab.simulation',
-        'cv2 matplotlib'),
+        'lab.evaluation.baselines lab.simulation', 'cv2 matplotlib'),
     'ros_3d_bb_lab.evaluation.noise': (
         'camera core estimation sessions tracking lab.evaluation lab.evaluation.tracking', 'matplotlib scipy'),
     'ros_3d_bb_lab.evaluation.tracking': (
-        'camera core estimation tracking lab.evaluation lab.evaluation.baselines',
-        'scipy trackeval'),
+        'camera core estimation tracking lab.evaluation lab.evaluation.baselines', 'scipy trackeval'),
     'ros_3d_bb_lab.evaluation.demo': (
-        'conversions core tracking visualization lab.evaluation lab.simulation.ros',
-        'matplotlib rosbag'),
+        'conversions core tracking visualization lab.evaluation lab.simulation.ros', 'matplotlib rosbag'),
     'ros_3d_bb_lab.evaluation.navigation': (
         'camera conversions core msg nodes.common tracking lab.evaluation lab.simulation lab.simulation.ros',
-        'geometry_msgs nav_msgs rospy sensor_msgs std_msgs tf2_msgs yaml'),
+        'ros yaml'),
     'ros_3d_bb_lab.evaluation.costmap': (
         'camera conversions core estimation msg tracking lab.evaluation lab.simulation lab.simulation.ros',
-        'nav_msgs rosgraph_msgs rospy sensor_msgs std_msgs tf2_msgs'),
+        'ros'),
     'ros_3d_bb_lab.evaluation.gazebo': (
-        'bags conversions core tracking lab.evaluation lab.simulation', 'rosbag tf2_msgs'),
-    'ros_3d_bb_lab.evaluation.latency': (
-        'bags conversions core msg nodes.common lab.evaluation',
-        'rosgraph roslib rospy sensor_msgs std_msgs visualization_msgs'),
-}
+        'bags conversions core tracking lab.evaluation lab.simulation', 'messages rosbag'),
+    'ros_3d_bb_lab.evaluation.latency': ('bags conversions core msg nodes.common lab.evaluation', 'ros')}
+MESSAGES = set('genpy actionlib_msgs diagnostic_msgs geometry_msgs nav_msgs rosgraph_msgs sensor_msgs std_msgs '
+               'std_srvs tf2_msgs visualization_msgs'.split())
+SETS = {'messages': MESSAGES, 'ros': MESSAGES | set(
+    'diagnostic_updater dynamic_reconfigure rosgraph roslib rospkg rospy tf2_ros'.split())}
 QT = {'PyQt5', 'python_qt_binding'}
 
 
@@ -89,12 +73,10 @@ MODULES = [module for module in modules_in(SOURCE) if not module.endswith('.__in
 
 
 @functools.lru_cache(maxsize=None)
-def imports_of(module, root=SOURCE, at_the_top=False):
-    """Top-level names of other packages, and dotted names of ours, that a module imports, or only when it is loaded."""
+def imports_of(module, root=SOURCE):
+    """Top-level names of other packages, and dotted names of ours, that a module imports."""
     with open(os.path.join(root, *module.split('.')) + '.py') as stream:
         tree = ast.parse(stream.read())
-    if at_the_top:
-        tree.body = [node for node in tree.body if isinstance(node, (ast.Import, ast.ImportFrom))]
     names = [name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names]
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom):
@@ -143,7 +125,8 @@ def test_modules_import_what_their_folder_may(module):
     folder = folder_of(module)
     folders, libraries = ALLOWED[folder]
     others, ours = imports_of(module)
-    assert others <= STANDARD_LIBRARY | {'numpy'} | set(libraries.split())
+    allowed = set().union(*(SETS.get(library, {library}) for library in libraries.split()))
+    assert others <= STANDARD_LIBRARY | {'numpy'} | allowed
     assert set(map(folder_of, ours)) <= set(map(full, folders.split())) | {folder, None}
 
 

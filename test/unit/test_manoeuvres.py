@@ -1,35 +1,29 @@
 """Manoeuvres: people who start to run, turn, stop or sit down between two images of a slow detector, and people whom it
 finds now and then.
-
-The camera stands at the origin of the map, 1 m up, and looks along x.
 """
 import math
 
 import numpy as np
 import pytest
 
-from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.types import CameraView, Detection
+from support import people
+from support.people import START_NS, at
 
-VIEW = CameraView(transform_from((0, 0, 1), OPTICAL_ROTATION))
-START_NS, NOISE_M, WALKING_MPS = 1000 * NS, 0.03, 1.4
+VIEW = people.VIEW._replace(intrinsics=None)  # everything is in view
+NOISE_M, WALKING_MPS = 0.03, 1.4
 RATES_HZ = [3, 5, 7.5, 10, 15, 30]
-
-
-def at(x, y, height=1.7):
-    return Detection(np.array([x, y, height / 2]), np.array([0.5, 0.5, height]), np.eye(3) * 0.04 ** 2)
 
 
 def play(rate_hz, seconds, boxes_at, tracker=None):
     """The published tracks of each image, of boxes (x, y) or (x, y, height) at `boxes_at(seconds)`, with noise."""
-    random, tracker, outputs = np.random.RandomState(1), tracker or Tracker(), []
-    for number in range(int(seconds * rate_hz)):
-        boxes = [at(x + random.normal(0, NOISE_M), y + random.normal(0, NOISE_M), *height)
-                 for x, y, *height in boxes_at(number / rate_hz)]
-        outputs.append(tracker.update(START_NS + int(number / rate_hz * NS), boxes, VIEW))
-    return outputs
+    random = np.random.RandomState(1)
+
+    def detections_at(time_s):
+        return [at(x + random.normal(0, NOISE_M), y + random.normal(0, NOISE_M), *height)
+                for x, y, *height in boxes_at(time_s)]
+    return people.play(tracker or Tracker(), seconds, detections_at, rate_hz, view=VIEW)
 
 
 def ids(outputs):

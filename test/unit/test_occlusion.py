@@ -10,7 +10,7 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.tracking.occlusion import classify_visibility, depths_towards
 from ros_3d_bb.tracking.track import PRESENT
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView
-from support.cylinders import mounted
+from support.people import mounted
 
 CAMERA = Camera(640, 480, 600.0, 600.0, 319.5, 239.5)
 LOOK = mounted(1.0)
@@ -26,13 +26,6 @@ def place(x, y, view=PLAIN, others=(), farthest_m=6.0):
 def with_depth(values_mm):
     depth = DepthImage(np.asarray(values_mm, np.uint16), 0.001)
     return PLAIN._replace(depth_at=functools.partial(depths_towards, CAMERA, depth))
-
-
-@pytest.mark.parametrize('x,y,expected', [
-    (3, 0, VISIBLE), (3, 1.3, VISIBLE), (3, 1.7, OUT_OF_VIEW), (3, -1.7, OUT_OF_VIEW), (-3, 0, OUT_OF_VIEW),
-    (0.2, 0, OUT_OF_VIEW), (7, 0, OUT_OF_VIEW)])
-def test_positions_are_in_view_or_not(x, y, expected):
-    assert place(x, y) == expected
 
 
 FOLDING = Camera(640, 480, 280, 280, 320, 240, 'plumb_bob', (-0.35, 0.12, 0, 0, -0.019))  # before the border

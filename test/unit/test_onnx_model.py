@@ -7,10 +7,9 @@ import pytest
 from ros_3d_bb.core.labels import COCO
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetector
-from ros_3d_bb.detection.onnx.heads import HEADS, P3, P6
+from ros_3d_bb.detection.onnx.heads import P3, P6
 from ros_3d_bb.detection.onnx.onnx_model import OnnxModel
 from ros_3d_bb.detection.weights import WeightsError
-from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_detector
 from ros_3d_bb.sessions.session_reader import read_color, read_session
 from support.onnx_files import FLOAT, FLOAT16, UINT8, outputs_of, write_constant_network, write_mean_network
 
@@ -146,22 +145,6 @@ def test_outputs_without_a_batch_axis(tmp_path, head):
     assert network.description.endswith('head: ' + head)
     found = network.candidates(np.zeros(HW + (3,), np.uint8), 0.25)
     np.testing.assert_allclose(found.boxes[np.argsort(-found.scores)], BOXES, atol=1e-3)
-
-
-@pytest.mark.parametrize('count', [0, 1, 100])
-@pytest.mark.parametrize('head', HEADS)
-def test_every_head_finds_none_one_or_a_hundred_people(tmp_path, head, count):
-    """As the node opens it, with a first detection in a black image."""
-    rows, columns = np.divmod(np.arange(count), 10)
-    corners = np.stack((60 * columns + 11.0, 45 * rows + 6.0), axis=-1)
-    people, scores = np.hstack((corners, corners + (31, 35))), np.zeros((count, 80))
-    scores[:, 0] = 0.9
-    outputs = outputs_of(head, people, scores, (480, 640), P6 if head in ('nanodet-plus', 'picodet') else P3)
-    path = write_constant_network(tmp_path / 'a.onnx', outputs, (1, 3, 480, 640))
-    detector = open_detector(path, DetectionParams(), RuntimeParams(threads=1))
-    for image in np.zeros((480, 640, 3), np.uint8), np.random.RandomState(0).randint(0, 255, (480, 640, 3), np.uint8):
-        found = detector.detect(image)
-        np.testing.assert_allclose(found.boxes[np.lexsort(found.boxes[:, :2].round().T)], people, atol=1e-2)
 
 
 @pytest.mark.parametrize('shape, channels_last', [

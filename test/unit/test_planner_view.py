@@ -1,10 +1,11 @@
-"""Positions of people at the current time, frames and footprints, against known positions."""
+"""Positions of people at the current time, frames and footprints, and which points show people."""
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
-from ros_3d_bb.camera.camera_model import transform_from
+from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from, transform_points
+from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.planning.people_removal import are_inside, cylinders_of, pixels_inside, scan_points
 from ros_3d_bb.planning.planner_view import (covariances_after, footprint_points, in_frame, position_after,
                                              predicted_to, usable_tracks, with_usable_covariances)
 from ros_3d_bb.tracking.types import OUT_OF_VIEW
@@ -137,3 +138,50 @@ def test_footprints_are_on_the_way_and_within_the_body(track, ahead_s):
     assert heights.min() == pytest.approx(-0.25, abs=1e-6) and heights.max() == pytest.approx(0.25, abs=1e-6)
     for place in (way[0], way[-1]):
         assert np.linalg.norm(points[:, :2] - place, axis=1).max() >= track.size_m[0] / 2 - 1e-6
+
+
+CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
+MARGIN_M = 0.2
+
+
+def test_cylinders_are_where_people_are_then_and_wider_if_uncertain():
+    walking = track_at([2, 1, 0.85], [1.0, 0, 0], covariance=np.diag([0.01, 0.04, 0, 0, 0, 0]))
+    walking = walking._replace(prediction_covariance_m2=np.tile(walking.covariance[:3, :3], (8, 1, 1)))
+    dog = track_at([0, 0, 0.3], [0, 0, 0])._replace(label='dog')
+    (x, y, radius_m, low_m, high_m), = cylinders_of([walking, dog], 0.3, MARGIN_M)
+    assert (x, y, radius_m) == pytest.approx((2.3, 1.0, 0.25 + MARGIN_M + 0.2))
+    assert (low_m, high_m) == pytest.approx((-MARGIN_M, 1.7 + MARGIN_M))
+    assert cylinders_of([], 0.3, MARGIN_M).shape == (0, 5)
+
+
+def test_beams_that_end_at_a_person_are_found_and_others_are_not():
+    ranges_m = np.array([2.0, 1.8, 4.0, np.inf, np.nan, 2.0])
+    points_m = scan_points(ranges_m, -0.2, 0.1) + [0, 0, 0.3]
+    found = are_inside(points_m, cylinders_of([track_at([2, 0, 0.85], [0, 0, 0])], 0.0, MARGIN_M))
+    assert found.tolist() == [True, True, False, False, False, False or np.hypot(
+        2 * np.cos(.3) - 2, 2 * np.sin(.3)) < 0.45]
+    assert not are_inside(points_m + [0, 0, 2], cylinders_of([track_at([2, 0, 0.85], [0, 0, 0])], 0.0, MARGIN_M)).any()
+
+
+@pytest.mark.parametrize('place_m', [(2.0, 0.3), (0.4, 0.1), (3.0, 2.5), (-2.0, 0.0)])
+def test_pixels_are_those_whose_points_lie_in_the_cylinder(place_m):
+    """Compared with all pixels one by one; the search is restricted to a part of the image."""
+    depth = DepthImage(np.random.RandomState(1).choice([0, 400, 1900, 2100, 3000], (48, 64)).astype(np.uint16), 0.001)
+    fixed_from_camera = transform_from((0, 0, 1), OPTICAL_ROTATION)
+    cylinders = cylinders_of([track_at(place_m + (0.85,), [0, 0, 0])], 0.0, MARGIN_M)
+    v, u = np.mgrid[:48, :64]
+    points_m = CAMERA.deproject(np.stack((u, v), axis=-1), depth.values * depth.scale_m)
+    expected = are_inside(transform_points(fixed_from_camera, points_m), cylinders) & (depth.values > 0)
+    assert (pixels_inside(depth, CAMERA, fixed_from_camera, cylinders) == expected).all()
+    assert expected.any() == (place_m in ((2.0, 0.3), (0.4, 0.1)))
+
+
+def test_lens_distortion_is_computed_once_for_all_images(monkeypatch):
+    """It takes longer than the rest."""
+    camera, calls, rays = CAMERA._replace(distortion_model='plumb_bob', distortion=(-0.1, 0, 0, 0, 0)), [], Camera.rays
+    monkeypatch.setattr(Camera, 'rays', lambda *arguments: calls.append(1) or rays(*arguments))
+    cylinders = cylinders_of([track_at([2, y, 0.85], [0, 0, 0]) for y in (-0.5, 0.5)], 0.0, MARGIN_M)
+    for depth_mm in (1800, 1900, 2000):
+        depth = DepthImage(np.full((48, 64), depth_mm, np.uint16), 0.001)
+        assert pixels_inside(depth, camera, transform_from((0, 0, 1), OPTICAL_ROTATION), cylinders).any()
+    assert len(calls) == 1

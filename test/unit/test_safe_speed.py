@@ -1,13 +1,16 @@
-"""The highest safe speed against the motion of the robot and people that it assumes."""
+"""The highest safe speed against the motion of the robot and people that it assumes, also before blind corners."""
 import time
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
+from ros_3d_bb.planning.blind_corners import LEAST_WIDTH_M, blind_corners
 from ros_3d_bb.planning.planner_view import position_after
-from ros_3d_bb.planning.safe_speed import SafeSpeedParams, highest_safe_speed, limited_velocity
+from ros_3d_bb.planning.safe_speed import (CornerParams, SafeSpeedParams, highest_safe_speed, limited_velocity,
+                                           speed_before_corners)
+from ros_3d_bb_lab.simulation.laser import BEAMS, FIELD_OF_VIEW, RANGE_M, scan_ranges
+from ros_3d_bb_lab.simulation.scenario import scenario_from
 from support.tracks import track_at
 
 PARAMS = SafeSpeedParams(position_sigmas=0.0)
@@ -106,3 +109,85 @@ def test_limited_velocities_stay_on_their_path():
     assert limited_velocity((0.3, 0.0, 0.5), 0.4) == (0.3, 0.0, 0.5)
     assert limited_velocity((0.5, 0.0, 0.5), 0.0) == (0.0, 0.0, 0.0)
     assert limited_velocity((0.0, 0.0, 0.5), 0.0) == (0.0, 0.0, 0.5)  # the robot is round
+
+
+SAFETY, CORNERS = SafeSpeedParams(), CornerParams()
+STEP, AHEAD = FIELD_OF_VIEW / (BEAMS - 1), (1.0, 0.0, 0.0)
+PILLAR = {'at': [4.0, 1.2], 'size': [0.7, 0.7, 2.2]}
+HALF_BEAM_M = 0.02  # at the distance of the pillar
+
+
+def corners_from(x, furniture=(PILLAR,), people_m=(), changed=None):
+    """Corners (n, 2) in the map that a laser at (x, 0) sees, which looks along x."""
+    room = scenario_from({'duration': 1, 'people': [], 'room': {
+        'bounds': [-4, 13, -4, 4], 'height': 2.8, 'furniture': list(furniture)}}).room
+    ranges_m = scan_ranges((x, 0.0, 0.0), room, people_m, [0.15] * len(people_m))
+    corners_m = blind_corners(ranges_m if changed is None else changed(ranges_m), (0.1, RANGE_M), -FIELD_OF_VIEW / 2,
+                              STEP)
+    assert corners_m.shape[1] == 3 and not corners_m[:, 2].any()
+    return corners_m[:, :2] + [x, 0.0]
+
+
+@pytest.mark.parametrize('x', [1.0, 2.0, 3.0])
+def test_a_pillar_has_a_corner_on_each_side_of_its_shadow(x):
+    beside, behind = sorted(corners_from(x).tolist(), key=lambda corner: corner[1])
+    assert beside == pytest.approx([4.3, 0.85], abs=0.06) and behind == pytest.approx([3.65, 1.5], abs=0.06)
+
+
+def test_walls_legs_and_narrow_poles_hide_no_people():
+    assert not len(corners_from(0.0, furniture=()))
+    assert not len(corners_from(0.0, furniture=[dict(PILLAR, size=[LEAST_WIDTH_M - 0.05] * 2 + [2.2])]))
+    assert not len(corners_from(0.0, furniture=(), people_m=[(2.0, 0.5), (1.0, -1.0)]))
+
+
+@pytest.mark.parametrize('invalid', [np.nan, -np.inf, 0.0])
+def test_invalid_ranges_are_ignored(invalid):
+    def changed(ranges_m):
+        ranges_m[::7] = invalid
+        return ranges_m
+    assert corners_from(2.0, changed=changed) == pytest.approx(corners_from(2.0), abs=2 * HALF_BEAM_M)
+
+
+@pytest.mark.parametrize('first_deg', [-180, -8, 0, 5, 9])
+@pytest.mark.parametrize('step_deg', [1, -1])
+def test_an_obstacle_across_the_ends_of_a_full_circle_has_two_corners(first_deg, step_deg):
+    """As straight ahead of a robot whose laser is mounted backwards."""
+    angles = np.radians(first_deg + step_deg * np.arange(360))
+    ranges_m = np.where(np.cos(angles) >= np.cos(np.radians(8.5)), 2.0, 6.0)
+    corners_m = blind_corners(ranges_m, (0.1, RANGE_M), angles[0], np.radians(step_deg))
+    corner_m = 2.0 * np.cos(np.radians(8)), 2.0 * np.sin(np.radians(8))
+    np.testing.assert_allclose(sorted(corners_m[:, 1]), [-corner_m[1], corner_m[1]])
+    np.testing.assert_allclose(corners_m[:, 0], corner_m[0])
+
+
+def speed_at(x, corners_m, params=CORNERS, velocity=AHEAD):
+    return speed_before_corners(np.reshape(corners_m, (-1, 2)) - [x, 0.0], 0.0, velocity, SAFETY, params)
+
+
+def test_the_robot_slows_down_until_it_has_passed_the_corner():
+    speeds_mps = [speed_at(x, [4.35, 0.85]) for x in np.arange(0, 4.3, 0.2)]
+    assert speeds_mps == sorted(speeds_mps, reverse=True)
+    assert speeds_mps[0] > 1.2 and speeds_mps[-1] == CORNERS.corner_speed
+    assert speed_at(4.4, [4.35, 0.85]) == SAFETY.highest_speed
+    assert speed_at(3.0, [4.35, 5.0]) == SAFETY.highest_speed > speed_at(3.0, [4.35, -0.85])
+
+
+def stopped_before(speed_mps, corner_m, people_mps):
+    """Whether a robot that brakes from a speed stands before anyone from the corner can touch it."""
+    times_s = np.arange(0, SAFETY.reaction_time + speed_mps / SAFETY.deceleration, 0.01)
+    braking_s = np.maximum(times_s - SAFETY.reaction_time, 0)
+    robot_m = np.column_stack((speed_mps * times_s - SAFETY.deceleration * braking_s ** 2 / 2, 0 * times_s))
+    return (np.linalg.norm(robot_m - corner_m, axis=1) - people_mps * times_s > SAFETY.robot_radius).all()
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.floats(0.5, 5), st.floats(-3, 3), st.floats(0.2, 2.5))
+def test_the_robot_stops_before_people_from_the_corner(x, y, people_mps):
+    speed_mps = speed_at(0.0, [x, y], CornerParams(emerging_speed=people_mps))
+    if speed_mps > CORNERS.corner_speed:
+        assert stopped_before(speed_mps, [x, y], people_mps)
+
+
+def test_an_older_scan_allows_less_speed():
+    older, newer = (speed_before_corners([[2.0, 1.2]], age_s, AHEAD, SAFETY, CORNERS) for age_s in (0.3, 0.0))
+    assert CORNERS.corner_speed < older < newer

@@ -2,7 +2,6 @@
 
 Without the weights of ROS_3D_BB_DATA, the true boxes replace those of YOLOv5.
 """
-import glob
 import os
 
 import pytest
@@ -10,6 +9,7 @@ import pytest
 from conftest import DATA
 from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb_lab.evaluation.clear_mot import score
+from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_paths, scene_name
 from ros_3d_bb_lab.evaluation.scene_benchmark import (RANGE_M, depth_detector, detections_without_scores,
                                                       exact_detector, result_of, yolov5_detector)
 from ros_3d_bb_lab.evaluation.scenes import run_scene, score_detections
@@ -17,10 +17,8 @@ from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import Simulator
 
 REAL_WEIGHTS = pytest.mark.needs(*['torch'] * bool(DATA))
-FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'scenarios')
-SCENES = sorted(os.path.basename(path) for path in glob.glob(os.path.join(FOLDER, '*.yaml')))
-THESIS_SCENES = [name for name in SCENES if name.startswith('thesis_')]
-ERROR_MODEL = os.path.join(FOLDER, os.pardir, 'error_models', 'simulated_d435i.yaml')
+THESIS_SCENES = scenario_paths('thesis_*')
+SCENES = [path for path in scenario_paths('*') if scene_name(path) != 'follow']  # which takes ten minutes
 # Every n-th of 15 images per second; the result is 7.5 and 5, as on a small computer.
 EVERY = {'depth': 2, 'yolov5': 3}
 OTHERS_EVERY = {'depth': 10, 'yolov5': 20}  # scenes in which only detections are scored
@@ -39,7 +37,7 @@ def runs(yolov5):
     """The steps of each scene with each detector: {(detector, scene): steps}."""
     found = {}
     for name in SCENES:
-        simulator = Simulator(read_scenario(os.path.join(FOLDER, name)))
+        simulator = Simulator(read_scenario(name))
         every = EVERY if name in THESIS_SCENES else OTHERS_EVERY
         found['depth', name] = run_scene(simulator, depth_detector(simulator), every['depth'])
         found['yolov5', name] = run_scene(simulator, yolov5, every['yolov5'])
@@ -48,7 +46,7 @@ def runs(yolov5):
 
 @pytest.mark.slow
 @pytest.mark.parametrize('detector', ['yolov5', 'depth'])
-@pytest.mark.parametrize('name', THESIS_SCENES)
+@pytest.mark.parametrize('name', THESIS_SCENES, ids=scene_name)
 @REAL_WEIGHTS
 def test_everybody_in_the_thesis_scenes_keeps_one_id(runs, name, detector):
     """Each person is visible for a second; tracks are published from the fourth detection on."""
@@ -74,11 +72,11 @@ def test_recall_and_false_positives_of_detectors(runs, detector, recall, false_r
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('name', [name for name in SCENES if name.startswith('approach_')])
+@pytest.mark.parametrize('name', scenario_paths('approach_*'), ids=scene_name)
 def test_a_person_approaching_to_half_a_metre_is_one_visible_track(name):
     """At 10 images per second; all images: ./run bench scenes. The scene comes to half a metre for two seconds."""
-    simulator = Simulator(read_scenario(os.path.join(FOLDER, name)))
-    steps = run_scene(simulator, exact_detector(simulator), 3, error_model=read_error_model(ERROR_MODEL))
+    simulator = Simulator(read_scenario(name))
+    steps = run_scene(simulator, exact_detector(simulator), 3, error_model=read_error_model(SIMULATED_ERROR_MODEL))
     result = result_of(steps, 'exact', simulator.camera)
     assert (result['images'], result['people'], result['recall'], result['false_boxes']) == (95, 1, 1, 0)
     assert (result['track_ids'], result['not_visible'], result['id_switches']) == (1, 0, 0)

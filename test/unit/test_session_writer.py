@@ -3,18 +3,20 @@ import multiprocessing
 import os
 import pathlib
 import re
+import stat
 
 import numpy as np
 import pytest
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.core.atomic_file import atomic_write
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.sessions import session_writer
-from ros_3d_bb.sessions.snapshots import ColorImage, Snapshot
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb.sessions.session_writer import append, remove
+from ros_3d_bb.sessions.snapshots import ColorImage, Snapshot
 
 CAMERA = Camera(64, 48, 60.0, 61.0, 31.5, 23.25, 'plumb_bob', (0.1, -0.2, 0.001, 0.002, 0.03))
 STAMP_NS = 1616161616 * NS + 123456789
@@ -137,3 +139,24 @@ def test_a_full_disk_does_not_change_the_session(folder, monkeypatch, full_at):
     with pytest.raises(OSError):
         append(folder, measurement(1))
     assert content_of(folder) == before
+
+
+def test_an_error_does_not_change_the_file(tmp_path):
+    with session_writer.locked_update(str(tmp_path)) as content:
+        content['frames'].append({'id': 'a'})
+    before = (tmp_path / 'frames.json').read_bytes()
+    with pytest.raises(RuntimeError), session_writer.locked_update(str(tmp_path)) as content:
+        content['frames'] = []
+        raise RuntimeError
+    with pytest.raises(ValueError), session_writer.locked_update(str(tmp_path)) as content:
+        content['depth'] = float('nan')
+    assert (tmp_path / 'frames.json').read_bytes() == before
+
+
+def test_the_file_mode_follows_the_umask(tmp_path):
+    mask = os.umask(0o027)
+    try:
+        atomic_write(str(tmp_path / 'file'), b'data')
+    finally:
+        os.umask(mask)
+    assert stat.S_IMODE(os.stat(str(tmp_path / 'file')).st_mode) == 0o640

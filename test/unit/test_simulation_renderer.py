@@ -6,11 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb_lab.simulation.body import Body, Build
 from ros_3d_bb_lab.simulation.mesh import box
 from ros_3d_bb_lab.simulation.renderer import render
 from ros_3d_bb_lab.simulation.room import FLOOR, RenderedRoom
-from support.cylinders import mounted
+from support.people import mounted
 
 BOUNDS, HEIGHT = (-3.0, 9.0, -4.0, 4.0), 2.8
 CAMERA = Camera(160, 120, 153.7, 153.7, 79.8, 60.5)
@@ -31,11 +30,6 @@ poses = st.builds(pose, st.tuples(st.floats(-2.5, 8.5), st.floats(-3.5, 3.5), st
 @pytest.fixture(scope='module')
 def room():
     return RenderedRoom(BOUNDS, HEIGHT, np.random.RandomState(3))
-
-
-@pytest.fixture(scope='module')
-def person():
-    return Body(Build(), np.random.RandomState(0)).posed()
 
 
 def crate(size, position, yaw=0.0, color=(200, 40, 40)):
@@ -94,17 +88,3 @@ def test_depth_of_a_box_is_that_of_rays(room, camera, x, y, yaw, size):
     for number in range(3):
         on_side = everywhere(hit & (axis == number))
         np.testing.assert_allclose(drawn.inverse_depth[on_side], 1 / near[on_side], rtol=1e-4)
-
-
-def test_objects_identify_the_object_of_each_pixel(room, person):
-    meshes = [person.moved((3, -.5, 0), 2.0), crate((.5, .5, 1), (2.5, .3, 0)), person.moved((4, .2, 0), 0.0)]
-    rendering, empty = draw(room, meshes), draw(room, [])
-    alone = [draw(room, [mesh]) for mesh in meshes]
-    layers = np.stack([empty.inverse_depth] + [single.inverse_depth for single in alone])
-    np.testing.assert_array_equal(rendering.inverse_depth, layers.max(axis=0))
-    np.testing.assert_array_equal(rendering.inverse_depth, np.choose(rendering.objects, layers))
-    np.testing.assert_array_equal(rendering.color[rendering.objects == 0], empty.color[rendering.objects == 0])
-    for number, single in enumerate(alone, 1):
-        mask = rendering.objects == number
-        np.testing.assert_array_equal(rendering.color[mask], single.color[mask])
-        assert rendering.areas[number - 1] == single.areas[0] >= mask.sum() > 0

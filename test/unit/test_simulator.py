@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE
-from ros_3d_bb_lab.simulation.scenario import Furniture, Mount, Move, Person, Robot, Room, Scenario
+from ros_3d_bb_lab.simulation.scenario import Furniture, Move, Person, Room, Scenario
 from ros_3d_bb_lab.simulation.simulator import Simulator
 
 CAMERA = Camera(160, 120, 153.7, 153.7, 79.8, 60.5)
@@ -23,11 +23,6 @@ def scene(*people, **others):
 
 def frame_of(*people, **others):
     return Simulator(scene(*people, **others), CAMERA).frame(0)
-
-
-def visible_ids(frame):
-    """IDs of the people who have a 2D box."""
-    return [person.id for person in frame.people if person.box_px is not None]
 
 
 @pytest.fixture(scope='module')
@@ -50,20 +45,6 @@ def test_a_frame_depends_on_scenario_and_number_only():
     different = Simulator(noisy._replace(seed=5), CAMERA).frame(5)
     assert different.color.tobytes() != frames[5].color.tobytes()
     assert different.depth_mm.tobytes() != frames[5].depth_mm.tobytes()
-
-
-def test_several_cameras_take_turns_at_their_mounts():
-    """One faces forward, the other left and down from 2 m above the floor; a person is in front of each."""
-    sideways = Mount('side', (0.0, 0.3, 1.9), np.pi / 2, 0.4)
-    robot = Robot(pose=(1.0, 0.0, 0.0), base_height=0.1, cameras=(Mount('front'), sideways))
-    simulator = Simulator(scene(Person((4.0, 0.0)), Person((1.0, 3.0)), robot=robot), CAMERA)
-    assert (simulator.cameras, simulator.rate, simulator.frame_count) == (['front', 'side'], 20.0, 60)
-    frames = [simulator.frame(number) for number in (0, 1, 2)]
-    assert [(frame.camera, frame.time_s) for frame in frames] == [('front', 0.0), ('side', 0.05), ('front', 0.1)]
-    assert [visible_ids(frame) for frame in frames] == [[1], [2], [1]]
-    side = frames[1].poses.map_from_camera
-    np.testing.assert_allclose(side[:3, 3], (1.0, 0.3, 2.0), atol=1e-9)
-    np.testing.assert_allclose(side[:3, 2], (0, np.cos(0.4), -np.sin(0.4)), atol=1e-9)
 
 
 @pytest.fixture(scope='module')

@@ -26,16 +26,6 @@ def test_ids_start_at_1_and_are_not_reused():
     assert [track.id for track in tracker.update(0, [at(0, 0)])] == [4]
 
 
-@pytest.mark.parametrize('rate_hz', [5, 60])
-def test_velocity_is_metres_per_second_at_any_rate(rate_hz):
-    tracker = ThesisTracker()
-    for frame in range(5 * rate_hz):
-        track, = tracker.update(seconds(frame / rate_hz), [at(1.2 * frame / rate_hz, -0.5 * frame / rate_hz)])
-    np.testing.assert_allclose(track.velocity_mps, [1.2, -0.5, 0], atol=0.01)
-    np.testing.assert_allclose(track.instant_velocity_mps, [1.2, -0.5, 0], atol=1e-6)
-    assert track.moving
-
-
 def test_velocity_is_averaged_with_alpha():
     """v' = alpha * v_new + (1 - alpha) * v, from zero."""
     tracker = ThesisTracker(ThesisTrackerParams(alpha=0.25))

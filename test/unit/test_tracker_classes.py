@@ -1,27 +1,25 @@
 """Classes of objects in the trackers: labels, filtered scores, groups, and the detection of each track."""
-import numpy as np
 import pytest
 
-from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
 from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.measurement_model import Kinds
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
 from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.types import NOT_DETECTED, VISIBLE, CameraView, Detection
+from ros_3d_bb.tracking.types import NOT_DETECTED, VISIBLE
+from support import people
+from support.people import VIEW
 
-VIEW = CameraView(transform_from((0, 0, 1), OPTICAL_ROTATION), Camera(640, 480, 600, 600, 320, 240))
 TRACKERS = [Tracker, ThesisTracker]
 
 
-def at(x, y, label='person', score=0.0, index=0, height=1.0):
-    return Detection(np.array([x, y, height / 2]), np.array([0.5, 0.5, height]), np.eye(3) * 0.03 ** 2, label=label,
-                     score=score, index=index)
+def at(x, y, label='person', score=0.0, index=0):
+    return people.at(x, y, height=1.0, sigma=0.03, label=label, score=score, index=index)
 
 
-def play(tracker, images, rate_hz=30):
+def play(tracker, images):
     """The tracks after each image, a list of detections."""
-    return [tracker.update(number * NS // rate_hz, detections, VIEW) for number, detections in enumerate(images)]
+    return [tracker.update(number * NS // 30, detections, VIEW) for number, detections in enumerate(images)]
 
 
 @pytest.mark.parametrize('kind', TRACKERS)

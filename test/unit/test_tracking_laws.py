@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from ros_3d_bb.camera.camera_model import Camera, transform_from, transform_points
+from ros_3d_bb.camera.camera_model import transform_from, transform_points
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.measurement_model import NoiseParams
@@ -13,11 +13,10 @@ from ros_3d_bb.tracking.thesis_tracker import ThesisTracker, ThesisTrackerParams
 from ros_3d_bb.tracking.track import PredictionParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
 from ros_3d_bb.tracking.types import CameraView, Detection
-from support.cylinders import mounted
+from support.people import CAMERA, START_NS, VIEW, mounted
 from support.states import covariance_of
 
-CAMERA = Camera(640, 480, 533.0, 533.0, 319.5, 239.5)
-START_NS, PERIOD_NS = 1000 * NS, NS // 30
+PERIOD_NS = NS // 30
 SEEDS = st.integers(0, 2 ** 32 - 1)
 KALMAN = TrackerParams, NoiseParams, PredictionParams
 
@@ -55,7 +54,7 @@ def test_nearly_singular_covariances_do_not_stop_the_tracker(angle):
     covariance_m2 = 1e7 * np.outer(along, along) - 0.005 * np.eye(3)
     for number in range(30):
         detection = Detection(np.append(3 * along[:2], 0.85), np.array([0.5, 0.5, 1.7]), covariance_m2)
-        tracker.update(START_NS + number * NS // 30, [detection], CameraView(mounted(1.0), CAMERA))
+        tracker.update(START_NS + number * NS // 30, [detection], VIEW)
 
 
 def ends_of_sliders():
@@ -71,14 +70,13 @@ def ends_of_sliders():
 def test_a_detected_person_keeps_one_id_at_the_ends_of_all_sliders(make, kinds, given_params, changed_at):
     """The person walks in a slight curve. The parameter is changed before the first image, or after 2 s."""
     random, tracker, published = np.random.RandomState(0), make(), []
-    view = CameraView(mounted(1.0), CAMERA)
     for image in range(60):
         if image == changed_at:
             tracker.reconfigure(*params_from(given_params, *kinds))
         x_m, y_m, height_m = (5 - 0.06 * image, 0.3 * np.sin(0.12 * image), 1.7) + random.normal(0, 0.03, 3)
         person = Detection(np.array([x_m, y_m, height_m / 2]), np.array([0.5, 0.5, height_m]), np.eye(3) * 0.04 ** 2,
                            score=0.97)
-        published.append([track.id for track in tracker.update(START_NS + 3 * image * PERIOD_NS, [person], view)])
+        published.append([track.id for track in tracker.update(START_NS + 3 * image * PERIOD_NS, [person], VIEW)])
     assert published[10:] == [[1]] * 50
 
 

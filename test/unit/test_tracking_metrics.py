@@ -43,19 +43,6 @@ def scores(run, make):
     return scores_of([score_run(run, outputs_of(run, make))])
 
 
-def right(_number, truth):
-    return [track(1, truth.position_m[0]), track(2, truth.position_m[1])]
-
-
-def test_a_perfect_tracker_has_perfect_scores():
-    result = scores(run_of(), right)
-    assert [result[key] for key in ('hota', 'mota', 'idf1', 'recall', 'precision')] == pytest.approx([100] * 5)
-    assert (result['id_switches'], result['fragmentations']) == (0, 0)
-    for key in ('position_rmse_m', 'velocity_rmse_mps', 'ade_1s_m', 'fde_1s_m', 'ade_2s_m', 'fde_2s_m'):
-        assert result[key] == pytest.approx(0, abs=1e-9)
-    assert result['coverage_95_position'] is None and result['coverage_95_2s'] is None
-
-
 def test_two_people_who_swap_ids_half_way_are_two_switches():
     late = IMAGES // 2
     result = scores(run_of(), lambda number, truth: [

@@ -9,8 +9,7 @@ import torch
 from ros_3d_bb.detection.weights import WeightsError
 from ros_3d_bb.detection.yolov5 import backends, torch_backend
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime
-from ros_3d_bb.detection.onnx.decoders import decode_rows
-from support.checkpoints import random_network, supported, write_checkpoint
+from support.checkpoints import random_network, write_checkpoint
 from support.layouts import layout
 from support.official_reference import made
 
@@ -35,20 +34,6 @@ def image_of(height=96, width=128):
 def assert_same_predictions(runtime, network, image):
     expected = torch_backend.run(network, image).numpy()
     np.testing.assert_allclose(runtime(image, -1), expected, atol=1e-3, rtol=1e-4)
-
-
-def exported_onnx(path, network, hw, metadata, dynamic=False):
-    """Write a network as YOLOv5's export does: one output, stride and names in the metadata."""
-    import onnx
-    axes = {'images': {2: 'height', 3: 'width'}, 'output0': {1: 'rows'}} if dynamic else None
-    torch.onnx.export(network, torch.zeros((1, 3) + hw), path, opset_version=12, input_names=['images'],
-                      output_names=['output0'], dynamic_axes=axes, **supported(torch.onnx.export, dynamo=False))
-    model = onnx.load(path)
-    for key, value in metadata.items():
-        entry = model.metadata_props.add()
-        entry.key, entry.value = key, value
-    onnx.save(model, path)
-    return path
 
 
 @pytest.mark.slow
@@ -84,22 +69,6 @@ def test_every_kind_of_network_is_exported(tmp_path, release, model, changes):
     runtime = open_runtime(path, ON_ONNX)
     assert runtime.stride == (64 if model == 'n6' else 32)
     assert_same_predictions(runtime, network, image_of(128, 64))
-
-
-@pytest.mark.slow
-@needs_onnx
-@pytest.mark.parametrize('dynamic', [False, True])
-def test_onnx_exports_give_the_same_predictions(tmp_path, dynamic):
-    network = random_network(dict(layout('6.0', 'n', 3), activation='nn.ReLU()')).fuse()  # torch 1.7 exports no SiLU
-    path = exported_onnx(str(tmp_path / 'model.onnx'), network, (96, 128),
-                         {'stride': '32', 'names': "{0: 'person', 1: 'cat', 2: 'dog'}"}, dynamic)
-    runtime = open_runtime(path)
-    assert runtime.names == ['person', 'cat', 'dog'] and runtime.stride == 32
-    assert runtime.input_hw == (None if dynamic else (96, 128))
-    rows = torch_backend.run(network, image_of()).numpy()
-    expected = decode_rows([rows[None]], (96, 128), 3, 0)
-    for column, expected_column in zip(runtime.candidates(image_of(), 0), expected):
-        np.testing.assert_allclose(column, expected_column, atol=1e-3, rtol=1e-4)
 
 
 @pytest.mark.slow

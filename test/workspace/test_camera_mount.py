@@ -30,10 +30,33 @@ from ros_3d_bb_lab.simulation.simulator import Simulator
 from support.bags import changed_bag, messages_in
 from support.launching import loaded
 from support.masterless import masterless
-from support.rolled_camera import FRAME, HEIGHT_M, ROLL_RAD, TILT_RAD, RolledSimulator
 
+HEIGHT_M, TILT_RAD, ROLL_RAD, FRAME = 1.2, 0.1, np.radians(12), 'camera_color_optical_frame'
+PEOPLE = [{'start': [2.6, -0.5], 'moves': [{'to': [3.4, 0.9]}]}, {'start': [3.6, 0.8], 'moves': [{'to': [3.4, -0.9]}]},
+          {'start': [4.4, -0.8], 'facing': 2.0}]
 SCENE = {'duration': 0.8, 'rate': 10.0, 'robot': {'mount': [0.0, 0.0, HEIGHT_M - 0.065], 'pitch': TILT_RAD},
          'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}, {'start': [4.0, -0.8], 'facing': 2.0}]}
+
+
+class RolledSimulator(Simulator):
+    """A camera whose right side is lower, and three people for 3 s at 10 Hz. The map is on the floor below."""
+
+    def __init__(self):
+        super(RolledSimulator, self).__init__(scenario_from({
+            'duration': 3.0, 'rate': 10.0, 'people': PEOPLE,
+            'robot': {'mount': [0.0, 0.0, HEIGHT_M - 0.065], 'pitch': TILT_RAD}}))
+
+    def poses(self, state, camera=0):
+        poses, rolled = super(RolledSimulator, self).poses(state, camera), np.eye(4)
+        rolled[:3, :3] = [[np.cos(ROLL_RAD), -np.sin(ROLL_RAD), 0], [np.sin(ROLL_RAD), np.cos(ROLL_RAD), 0], [0, 0, 1]]
+        return poses._replace(base_from_camera=poses.base_from_camera.dot(rolled))
+
+    def messages(self, frame):
+        """Stamp in nanoseconds of a frame, and its [(topic, message)]."""
+        stamp_ns = START_NS + int(frame.time_s * NS)
+        header = Header(stamp=time_from(stamp_ns), frame_id=FRAME)
+        depth = DepthImage(frame.depth_mm, 0.001)
+        return stamp_ns, list(image_messages_of(CameraFrame(header, self.camera, frame.color, depth, ())))
 
 
 @pytest.fixture(scope='module')

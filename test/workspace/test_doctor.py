@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import Transform, TransformStamped
 from sensor_msgs.msg import CameraInfo
-from std_msgs.msg import Header
 
 from ros_3d_bb.bags.bag_writer import write_bag
+from ros_3d_bb.camera.camera_model import transform_from
+from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth
 from ros_3d_bb.nodes.common.graph_observer import GraphObserver
 from ros_3d_bb.nodes.doctor import bag_findings, machine_findings
@@ -40,7 +40,6 @@ def changed(bag, folder, change):
 
 
 def examined(path, camera='', target_frame='', depth='aligned'):
-    """Findings, and the next command."""
     given = argparse.Namespace(bag=str(path), camera=camera, target_frame=target_frame, depth=depth)
     found, command, _purpose = bag_findings(given)
     return found, command
@@ -133,10 +132,9 @@ def raw_only(topic, message):
         message.header.frame_id = 'camera_depth_optical_frame'
         return (RAW if topic == DEPTH else RAW_INFO), message
     if topic == '/tf':
-        link = TransformStamped(message.transforms[0].header, 'camera_depth_optical_frame', Transform())
-        link.header = Header(stamp=link.header.stamp, frame_id='camera_color_optical_frame')
-        link.transform.translation.x, link.transform.rotation.w = 0.05, 1.0
-        message.transforms.append(link)
+        beside = transform_from((0.05, 0, 0), (0, 0, 0, 1))
+        message.transforms += transform_messages(message.transforms[0].header.stamp, [
+            ('camera_color_optical_frame', 'camera_depth_optical_frame', beside)])
     return topic, message
 
 

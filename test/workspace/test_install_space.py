@@ -33,7 +33,6 @@ def built(tmp_path_factory, *options, **environment):
 
 @pytest.fixture(scope='module')
 def installed(tmp_path_factory):
-    """An install space."""
     prefix = str(tmp_path_factory.mktemp('install'))
     built(tmp_path_factory, '-DCMAKE_INSTALL_PREFIX=' + prefix, '-DCATKIN_ENABLE_TESTING=OFF')
     return prefix
@@ -54,7 +53,6 @@ def run_in(prefix, command, *arguments, **options):
 
 
 def files_in(folder):
-    """Paths of all files in a folder, relative to it."""
     return sorted(os.path.relpath(os.path.join(parent, name), folder)
                   for parent, _folders, names in os.walk(folder) for name in names)
 
@@ -69,7 +67,6 @@ def test_launch_config_rviz_and_scripts_are_installed(installed):
 
 @pytest.fixture(scope='module')
 def master():
-    """The URI of a ROS master."""
     port = str(free_port())
     process = subprocess.Popen(['rosmaster', '--core', '-p', port], stdout=subprocess.DEVNULL,
                                stderr=subprocess.DEVNULL)

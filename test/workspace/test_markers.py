@@ -1,36 +1,31 @@
 """Markers: content of each kind; they are updated while a track exists, and deleted when it ends."""
 import numpy as np
 import pytest
-from std_msgs.msg import Header
 from visualization_msgs.msg import Marker
 
-from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
+from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE
 from ros_3d_bb.visualization.markers import AREA, NAMESPACES as ALL_NAMESPACES, PALETTE, MarkerParams, MarkerWriter
+from support.ros import header_at
+from support.tracks import track_at
 
 NAMESPACES = [name for name in ALL_NAMESPACES if name != AREA]  # of tracks
 ALL = MarkerParams(marker_namespaces=NAMESPACES)
 SECOND_NS = 1000 * NS
 
 
-def header(stamp_ns=SECOND_NS):
-    return Header(stamp=time_from(stamp_ns), frame_id='map')
-
-
 def track(number, velocity=(1.0, 0.0, 0.0), steps=8, variances=(0.04, 0.01), turn=0.0, status=VISIBLE,
           position=(2.0, 1.0, 0.9)):
     """Track at (2, 1) of 1.7 m height, whose covariance has the `variances` along axes rotated by `turn` radians."""
-    position, velocity = np.array(position), np.array(velocity)
-    prediction = position + np.arange(1, steps + 1)[:, None] * 0.25 * velocity
+    made = track_at(position, velocity, number=number)
     covariance = predicted = None
     if variances:
         axes = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
         covariance = np.zeros((6, 6))
         covariance[:3, :3] = axes.dot(np.diag(variances + (0.01,))).dot(axes.T)
         predicted = np.array([step * covariance[:3, :3] for step in range(1, steps + 1)]).reshape(-1, 3, 3)
-    return TrackedObject(number, position, np.array([0.5, 0.5, 1.7]), velocity, velocity, status, True, 0, 7,
-                         prediction, 0.25, covariance, predicted)
+    return made._replace(status=status, prediction_m=made.prediction_m[:steps], covariance=covariance,
+                         prediction_covariance_m2=predicted)
 
 
 def keys(markers, action=Marker.ADD):
@@ -41,7 +36,7 @@ def drawn(tracks, params=ALL, times=2):
     """Last markers of a writer by namespace and ID, after several images of the same tracks."""
     writer = MarkerWriter(params)
     for image in range(times):
-        message = writer.write(tracks, header(SECOND_NS + image * NS // 10))
+        message = writer.write(tracks, header_at(SECOND_NS + image * NS // 10, 'map'))
     return {(marker.ns, marker.id): marker for marker in message.markers if marker.action == Marker.ADD}
 
 
@@ -59,11 +54,11 @@ def rgb(color):
 
 def test_markers_are_updated_while_the_track_exists_and_deleted_once():
     writer = MarkerWriter(ALL)
-    messages = [writer.write(tracks, header(SECOND_NS + image * NS)) for image, tracks in enumerate(
+    messages = [writer.write(tracks, header_at(SECOND_NS + image * NS, 'map')) for image, tracks in enumerate(
         ([track(3), track(5)], [track(3), track(5)], [track(5)], [track(5, (0.0, 0.0, 0.0))], []))]
     both = sorted((namespace, number) for namespace in NAMESPACES for number in (3, 5))
     assert sorted(keys(messages[1])) == both and keys(messages[1], Marker.DELETE) == []
-    assert all(marker.header == header(SECOND_NS + NS) and marker.lifetime.to_sec() == 2.0
+    assert all(marker.header == header_at(SECOND_NS + NS, 'map') and marker.lifetime.to_sec() == 2.0
                for marker in messages[1].markers)
     assert sorted(keys(messages[2], Marker.DELETE)) == sorted((namespace, 3) for namespace in NAMESPACES)
     assert keys(messages[3], Marker.DELETE) == [('prediction', 5), ('velocity', 5)]  # it stops
@@ -106,7 +101,8 @@ def test_the_history_is_the_path_and_fades_with_age():
     """A person walks along x at 1 m/s for 10 s."""
     writer = MarkerWriter(MarkerParams(marker_history=4.0))
     for image in range(101):
-        message = writer.write([track(1, position=(image / 10, 0.0, 0.85))], header(SECOND_NS + image * NS // 10))
+        header = header_at(SECOND_NS + image * NS // 10, 'map')
+        message = writer.write([track(1, position=(image / 10, 0.0, 0.85))], header)
     history = {marker.ns: marker for marker in message.markers if marker.action == Marker.ADD}['history']
     points, alphas = xyz(history), np.array([color.a for color in history.colors])
     assert history.type == Marker.LINE_STRIP and history.color.a < 1  # otherwise RViz draws it opaque
@@ -131,9 +127,9 @@ def test_tracks_that_are_not_visible_are_paler_and_have_a_question_mark(coloring
 def test_new_parameters_apply_to_the_next_image():
     """The history continues, because it is recorded even while it is not drawn."""
     writer = MarkerWriter(MarkerParams(marker_namespaces=['cylinder', 'id']))
-    writer.write([track(3)], header())
+    writer.write([track(3)], header_at(SECOND_NS, 'map'))
     writer.reconfigure(MarkerParams(marker_namespaces=['cylinder', 'history'], marker_lifetime=0.5))
-    markers = writer.write([track(3, position=(2.5, 1.0, 0.9))], header(SECOND_NS + NS))
+    markers = writer.write([track(3, position=(2.5, 1.0, 0.9))], header_at(SECOND_NS + NS, 'map'))
     assert sorted(keys(markers)) == [('cylinder', 3), ('history', 3)]
     assert keys(markers, Marker.DELETE) == [('id', 3)]
     assert all(marker.lifetime.to_sec() == 0.5 for marker in markers.markers if marker.action == Marker.ADD)
@@ -142,8 +138,8 @@ def test_new_parameters_apply_to_the_next_image():
 def test_ignored_areas_are_outlines_on_the_floor_until_removed():
     writer = MarkerWriter(MarkerParams())
     writer.areas_m = [np.array([[1.0, 2.0], [3.0, 2.0], [3.0, 4.0]])]
-    marker, = writer.write([], header(SECOND_NS)).markers
+    marker, = writer.write([], header_at(SECOND_NS, 'map')).markers
     assert (marker.ns, marker.id, marker.type) == (AREA, 0, Marker.LINE_STRIP)
     np.testing.assert_allclose(xyz(marker)[:, :2], [[1, 2], [3, 2], [3, 4], [1, 2]])
     writer.areas_m = []
-    assert keys(writer.write([], header(2 * SECOND_NS)), Marker.DELETE) == [(AREA, 0)]
+    assert keys(writer.write([], header_at(2 * SECOND_NS, 'map')), Marker.DELETE) == [(AREA, 0)]

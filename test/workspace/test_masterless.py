@@ -35,7 +35,6 @@ CODECS = {'plain': {}, 'compressed': {COLOR_TOPIC: 'jpeg', DEPTH_TOPIC: 'compres
 
 @pytest.fixture(scope='module', params=sorted(CODECS))
 def bags(request, tmp_path_factory):
-    """A bag of a scene, and the output of process_bag."""
     folder = tmp_path_factory.mktemp('bags')
     write_bag(scenario_images(scenario_from(SCENE)), str(folder / 'plain.bag'))
     names = rewritten(folder / 'plain.bag', folder / 'in.bag', {

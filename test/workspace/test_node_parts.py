@@ -1,9 +1,8 @@
-"""Parts of the nodes in situations that a graph cannot produce on demand: concurrent threads, and a master that accepts
-connections and never responds.
-"""
+"""Parts of the nodes in situations that a graph cannot produce: threads, and masters and detectors that hang."""
 import contextlib
 import socket
 import threading
+from types import SimpleNamespace
 from unittest import mock
 
 import numpy as np
@@ -11,12 +10,17 @@ import pytest
 import rospy
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
+from std_srvs.srv import SetBoolRequest
 
 from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.nodes.bbox3d_node import SampleImages
 from ros_3d_bb.nodes.common import master, startup, subscribers
+from ros_3d_bb.nodes.common.detector_output import DetectorWorker
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics, unsubscribed_results
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
+from ros_3d_bb.nodes.common.part import Part
+from ros_3d_bb.nodes.tracker_node import RESERVED_IDS, TrackIdReservation
 from support.ros import wait_until
 
 
@@ -116,3 +120,121 @@ def test_topics_of_dynamic_reconfigure_are_no_results():
         assert unsubscribed_results() == ['/ros_3d_bb/tracks']
         tracks.has_connections.return_value = True
         assert unsubscribed_results() == []
+
+
+NAME = '/tracker_node_numbers'
+
+
+def immediately(work, on_error):
+    """In place of the worker thread."""
+    def offer(item):
+        try:
+            work(item)
+        except OSError as error:
+            on_error(error)
+    return mock.Mock(offer=offer)
+
+
+@pytest.fixture
+def parameters(monkeypatch):
+    """The parameters; if 'fails' is among them, the master accepts no others."""
+    parameters = {}
+
+    def set_param(name, value):
+        if 'fails' in parameters:
+            raise ConnectionRefusedError(111, 'Connection refused')
+        parameters[name] = value
+    monkeypatch.setattr('rospy.get_name', lambda: '/tracker_node')
+    monkeypatch.setattr('rospy.get_param', lambda name, default: parameters.get(name, default))
+    monkeypatch.setattr('rospy.set_param', set_param)
+    monkeypatch.setattr('ros_3d_bb.nodes.tracker_node.on_new_master', lambda _function: None)
+    monkeypatch.setattr('ros_3d_bb.nodes.tracker_node.NewestWorker', immediately)
+    return parameters
+
+
+def test_a_restarted_tracker_continues_after_all_ids_assigned_before(parameters):
+    largest = 0
+    for life in range(5):
+        reservation = TrackIdReservation(EventCounter())
+        assert reservation.last_id >= largest and parameters[NAME] == reservation.last_id + RESERVED_IDS
+        for number in range(1, 700 * (life + 1), 100):
+            largest = reservation.last_id + number
+            reservation.reserve([mock.Mock(id=largest)])
+            assert parameters[NAME] > largest
+
+
+def test_ids_continue_without_the_master_and_the_fault_is_reported(parameters):
+    events = EventCounter()
+    reservation = TrackIdReservation(events)
+    parameters['fails'] = True
+    reservation.reserve([mock.Mock(id=5 * RESERVED_IDS)])
+    assert NAME in events.sentences['track IDs not reserved']
+    del parameters['fails']
+    reservation.reserve([mock.Mock(id=5 * RESERVED_IDS + 1)])
+    assert parameters[NAME] == 6 * RESERVED_IDS + 1
+
+
+@pytest.mark.parametrize('value', ['many', -1, 1.5, True, 2 ** 31 - 1])
+def test_an_invalid_parameter_is_rejected(parameters, value):
+    parameters[NAME] = value
+    with pytest.raises(ValueError, match=NAME):
+        TrackIdReservation(EventCounter())
+
+
+@pytest.fixture
+def now_s():
+    """The clock of the machine, as [seconds]."""
+    seconds = [1000.0]
+    with mock.patch('time.monotonic', lambda: seconds[0]):
+        yield seconds
+
+
+@pytest.fixture
+def rig(now_s):
+    """The worker, its service, the state and faults that it reports, and its detector, which takes a second."""
+    def detect(image):
+        now_s[0] += 1
+        if image == 'unusable':
+            raise ValueError('an unusable image')
+
+    diagnostics, path = EventCounter(), 'ros_3d_bb.nodes.common.detector_output.'
+    diagnostics.show, diagnostics.check = mock.Mock(), mock.Mock()
+    with mock.patch(path + 'rospy') as rospy, mock.patch(path + 'NewestWorker') as thread:
+        worker = DetectorWorker(SimpleNamespace(enabled=True, publish_empty=True), diagnostics, detect, (), Part())
+    yield SimpleNamespace(offer=worker.offer, enable=rospy.Service.call_args[0][2], work=thread.call_args[0][0],
+                          state=diagnostics.show.call_args[0][1],
+                          faults=lambda: list(diagnostics.check.call_args[0][0]()))
+
+
+def test_a_detector_that_hangs_is_reported_unless_it_is_paused(rig, now_s):
+    rig.offer('image')
+    now_s[0] += 4
+    rig.offer('image')  # images continue
+    assert rig.faults() == [] and rig.state() == 'working'
+    now_s[0] += 2
+    (event, sentence), = rig.faults()
+    assert event == 'detector hangs' and '6 s' in sentence
+    rig.enable(SetBoolRequest(False))
+    now_s[0] += 60
+    assert rig.faults() == [] and rig.state() == 'paused'
+    rig.enable(SetBoolRequest(True))
+    assert rig.faults() == []
+
+
+def test_a_detector_without_images_is_not_reported(rig, now_s):
+    """After a pause of the camera, the first image is still being processed."""
+    now_s[0] += 60
+    rig.offer('image')
+    assert rig.faults() == []
+    rig.work(('image',))
+    now_s[0] += 60
+    rig.offer('image')
+    now_s[0] += 1
+    assert rig.faults() == []
+
+
+def test_a_rejected_image_is_a_completed_detection(rig):
+    for _image in range(10):
+        rig.offer('unusable')
+        rig.work(('unusable',))
+        assert rig.faults() == []

@@ -45,7 +45,6 @@ def declared(*kinds):
 
 
 def imported(paths):
-    """Top-level names of other packages that Python files import."""
     names = set()
     for path in paths:
         with open(path) as stream:

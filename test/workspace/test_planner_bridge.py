@@ -6,17 +6,18 @@ from unittest import mock
 import numpy as np
 import pytest
 import rospy
-from geometry_msgs.msg import TransformStamped
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
+from ros_3d_bb.camera.camera_model import transform_from
+from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeNode
 from support.masterless import masterless
 from support.planner_definitions import package
-from support.planners import person
+from support.track_messages import person
 
 START_NS = 1000 * NS
 PACKAGES = 'people_msgs', 'costmap_converter', 'derived_object_msgs', 'vision_msgs'
@@ -52,11 +53,8 @@ class Bridge(object):
 
     def send_tf(self, stamp_ns, child, translation):
         """The pose of a frame in the map; it is turned by a quarter to the left."""
-        transform = TransformStamped(header=Header(stamp=time_from(stamp_ns), frame_id='map'), child_frame_id=child)
-        place, turn = transform.transform.translation, transform.transform.rotation
-        place.x, place.y, place.z = translation
-        turn.z = turn.w = 0.5 ** 0.5
-        self._connections.send('/tf', TFMessage([transform]))
+        pose = transform_from(translation, (0, 0, 1, 1))
+        self._connections.send('/tf', TFMessage(transform_messages(time_from(stamp_ns), [('map', child, pose)])))
 
     def send(self, stamp_ns, *tracks, frame_id='map'):
         header = Header(stamp=time_from(stamp_ns), frame_id=frame_id)
@@ -102,6 +100,7 @@ def test_costs_are_around_the_robot_where_it_is_now():
         bridge.send(START_NS, person(1, 0, 0))
         grid = bridge.message(COSTS)
         assert (grid.header.frame_id, grid.header.stamp.to_nsec()) == ('base_link', 0)
+        assert bridge.message(POINTS).header.stamp.to_nsec() == START_NS
         columns = np.reshape(grid.data, (grid.info.height, grid.info.width)).max(axis=0)
         x_m = grid.info.origin.position.x + (np.flatnonzero(columns == 99) + 0.5) * grid.info.resolution
         assert x_m.mean() == pytest.approx(2.0, abs=0.05)

@@ -1,4 +1,4 @@
-"""Tracks as planners read them: each message is serialized, and passed to a replica of its reader."""
+"""Tracks as planners read them: each message is serialized."""
 import os
 import sys
 
@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import PointCloud2
-from std_msgs.msg import Header
 
 from ros_3d_bb.camera.camera_model import transform_from, transform_points
 from ros_3d_bb.conversions.perception_msgs import time_from
@@ -20,26 +19,21 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeParams
 from ros_3d_bb.planning.planner_outputs import outputs_from
 from ros_3d_bb.planning.planner_view import footprint_points, in_frame, predicted_to
-from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
+from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE
 from support.masterless import on_the_wire
 from support.planner_definitions import PUBLISHED_MD5, message_class, package
-from support.planners import JackalMpcReplica
+from support.ros import header_at
+from support.tracks import track_at
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 QUARTER = transform_from((10, 5, 0), (0, 0, np.sqrt(0.5), np.sqrt(0.5)))  # odom_from_map: a quarter turn to the left
 STAMP_NS = 1000 * NS
 
 
-def header_in(frame_id, stamp_ns=STAMP_NS):
-    return Header(stamp=time_from(stamp_ns), frame_id=frame_id)
-
-
 def walker(number, position_m, velocity_mps, status=VISIBLE, width_m=0.6, label='person', score=0.0):
-    position_m, velocity_mps = np.array(position_m, float), np.array(velocity_mps, float)
-    prediction_m = position_m + np.outer(0.25 * np.arange(1, 9), velocity_mps)
-    covariance = np.diag([0.01, 0.04, 0.09, 0.1, 0.2, 0.3])
-    return TrackedObject(number, position_m, np.array([width_m, width_m, 1.7]), velocity_mps, velocity_mps, status,
-                         bool(velocity_mps.any()), 0, STAMP_NS, prediction_m, 0.25, covariance, None, label, score)
+    track = track_at(position_m, velocity_mps, moving=any(velocity_mps), number=number,
+                     covariance=np.diag([0.01, 0.04, 0.09, 0.1, 0.2, 0.3]))
+    return track._replace(size_m=np.array([width_m, width_m, 1.7]), status=status, label=label, score=score)
 
 
 @pytest.mark.parametrize('kind', sorted(PUBLISHED_MD5))
@@ -49,7 +43,7 @@ def test_the_definitions_used_here_are_the_published_ones(kind):
 
 def sent(write, package_name, tracks, frame_id='map'):
     """The message of a conversion, as its subscribers receive it."""
-    return on_the_wire(write(tracks, header_in(frame_id), package(package_name)))
+    return on_the_wire(write(tracks, header_at(STAMP_NS, frame_id), package(package_name)))
 
 
 def obstacles(tracks, frame_id='map'):
@@ -80,18 +74,17 @@ def test_points_of_obstacles_are_exact_only_in_a_frame_near_the_robot():
 
 
 def test_mpc_planner_jackal_receives_everyone_with_radius_and_velocity():
-    mpc = JackalMpcReplica()
-    message = sent(objects_to_msg, 'derived_object_msgs', [
-        walker(1, [1, 2, 0.9], [0.3, -1.1, 0]), walker(2, [4, 2, 0.9], [0, 0, 0], width_m=0.4)])
-    mpc.receive(message)
-    assert sorted(mpc.obstacles) == [1, 2]
-    centre, radius, velocity = mpc.obstacles[1]
-    np.testing.assert_allclose(centre, [1, 2])
-    np.testing.assert_allclose(velocity, [0.3, -1.1])
-    assert radius == pytest.approx(0.3) and mpc.obstacles[2][1] == pytest.approx(0.2)
-    item = message.objects[0]
-    assert (item.detection_level, item.classification, item.object_classified) == (1, 4, True)  # tracked pedestrian
-    assert item.shape.dimensions == pytest.approx((1.7, 0.3)) and item.header.stamp == time_from(STAMP_NS)
+    """It skips ID 0, takes the second dimension as the radius, and turns the twist by minus the yaw of the pose
+    (tud-amr/mpc_planner, ros1_jackal.cpp, obstacleCallback)."""
+    walking, standing = sent(objects_to_msg, 'derived_object_msgs', [
+        walker(1, [1, 2, 0.9], [0.3, -1.1, 0]), walker(2, [4, 2, 0.9], [0, 0, 0], width_m=0.4)]).objects
+    assert (walking.id, standing.id, walking.pose.orientation.w) == (1, 2, 1)
+    assert walking.shape.type == standing.shape.type == walking.shape.CYLINDER
+    assert (walking.pose.position.x, walking.pose.position.y) == (1, 2)
+    assert (walking.twist.linear.x, walking.twist.linear.y) == (0.3, -1.1)
+    assert (walking.detection_level, walking.classification, walking.object_classified) == (1, 4, True)  # pedestrian
+    assert walking.shape.dimensions == pytest.approx((1.7, 0.3)) and standing.shape.dimensions[1] == pytest.approx(0.2)
+    assert walking.header.stamp == time_from(STAMP_NS)
 
 
 @pytest.mark.parametrize('status, tag, reliability', [(VISIBLE, 'visible', 1.0), (OCCLUDED, 'occluded', 0.5),
@@ -144,7 +137,7 @@ def test_costmap_points_are_exact_on_large_maps(x, y, yaw, roll_deg, pitch_deg):
         tilted(roll_deg, pitch_deg, 0))
     track = walker(1, map_from_robot[:3, 3] + [3, -2, 0.65], [1, 0.5, 0])
     points, = [output for output in outputs_from(PlannerBridgeParams()) if output.topic == '~points']
-    message = on_the_wire(points.write([track], np.linalg.inv(map_from_robot), header_in(points.frame)))
+    message = on_the_wire(points.write([track], np.linalg.inv(map_from_robot), header_at(STAMP_NS, points.frame)))
     sent = np.frombuffer(message.data, '<f4').reshape(-1, 3).astype(float)
     in_map = transform_points(map_from_robot, sent) - track.position_m
     np.testing.assert_allclose(in_map, footprint_points([track], 0.3, 0.035) - track.position_m, rtol=0, atol=1e-5)

@@ -32,7 +32,6 @@ DEPTH = Settings(detector='depth')
 
 @pytest.fixture(scope='module')
 def scene(tmp_path_factory):
-    """A bag of two people, one and a half seconds long."""
     path = str(tmp_path_factory.mktemp('scene') / 'scene.bag')
     write_bag(scenario_images(scenario_from(SCENE)), path)
     return path
@@ -47,8 +46,11 @@ def session_bag(session_folder, tmp_path):
 
 
 def run_tool(*arguments):
-    return subprocess.run(['rosrun', 'ros_3d_bb', 'process_bag'] + [str(argument) for argument in arguments],
-                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
+    """Output of the command, which must succeed."""
+    result = subprocess.run(['rosrun', 'ros_3d_bb', 'process_bag'] + [str(argument) for argument in arguments],
+                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
+    assert result.returncode == 0, result.stdout
+    return result.stdout
 
 
 def test_people_are_tracked_and_the_input_is_kept(scene, tmp_path):
@@ -68,8 +70,7 @@ def test_people_are_tracked_and_the_input_is_kept(scene, tmp_path):
 
 
 def test_equal_bags_give_the_same_bytes(scene, tmp_path):
-    result = run_tool(scene, tmp_path / 'tool.bag', '--detector', 'depth')
-    assert result.returncode == 0, result.stdout
+    run_tool(scene, tmp_path / 'tool.bag', '--detector', 'depth')
     process_bag(scene, str(tmp_path / 'alone.bag'), DEPTH)
     assert filecmp.cmp(str(tmp_path / 'alone.bag'), str(tmp_path / 'tool.bag'), shallow=False)
 
@@ -113,16 +114,15 @@ def test_topics_can_be_remapped_and_a_missing_one_is_named(scene, tmp_path):
     remaps = ['%s:=%s' % (name, name.replace('camera/', 'front/')) for name in (
         'camera/color/image_raw', 'camera/aligned_depth_to_color/image_raw', 'camera/color/camera_info')]
     options = [part for remap in remaps for part in ('--remap', remap)] + ['--remap', 'ros_3d_bb/tracks:=people']
-    result = run_tool(renamed, tmp_path / 'out.bag', '--detector', 'depth', *options)
-    assert result.returncode == 0, result.stdout
+    run_tool(renamed, tmp_path / 'out.bag', '--detector', 'depth', *options)
     assert len(messages_in(tmp_path / 'out.bag')['/people']) == 15
 
 
 def test_without_transforms_the_summary_names_the_cause(scene, tmp_path):
     changed_bag(scene, tmp_path / 'in.bag', lambda topic, *rest: None if topic == '/tf' else (topic,) + rest)
-    result = run_tool(tmp_path / 'in.bag', tmp_path / 'out.bag', '--detector', 'depth')
-    assert result.returncode == 0 and '15  no transform' in result.stdout
-    assert result.stdout.splitlines()[-1].startswith('no tracks: no transform from camera_color_optical_frame to map')
+    printed = run_tool(tmp_path / 'in.bag', tmp_path / 'out.bag', '--detector', 'depth')
+    assert '15  no transform' in printed
+    assert printed.splitlines()[-1].startswith('no tracks: no transform from camera_color_optical_frame to map')
     found = messages_in(tmp_path / 'out.bag')
     assert '/ros_3d_bb/tracks' not in found and len(found['/ros_3d_bb/bb_3d']) == 15
 
@@ -221,10 +221,9 @@ def test_parameter_files_are_checked(tmp_path, capsys, text, complaint):
 def test_parameter_files_of_the_nodes_are_used(scene, tmp_path):
     config = os.path.join(os.path.dirname(__file__), '..', '..', 'config')
     (tmp_path / 'tracker.yaml').write_text('tracker: thesis\ntarget_frame: odom\n')
-    result = run_tool(scene, tmp_path / 'out.bag', '--detector', 'depth', '--tracker-params', tmp_path / 'tracker.yaml',
-                      '--bbox3d-params', os.path.join(config, 'bbox3d.yaml'),
-                      '--depth-params', os.path.join(config, 'depth_detector.yaml'))
-    assert result.returncode == 0, result.stdout
+    run_tool(scene, tmp_path / 'out.bag', '--detector', 'depth', '--tracker-params', tmp_path / 'tracker.yaml',
+             '--bbox3d-params', os.path.join(config, 'bbox3d.yaml'),
+             '--depth-params', os.path.join(config, 'depth_detector.yaml'))
     assert messages_in(tmp_path / 'out.bag')['/ros_3d_bb/tracks'][-1].header.frame_id == 'odom'
 
 

@@ -64,7 +64,6 @@ def images(color, depth):
 
 @pytest.fixture(scope='module')
 def bag(tmp_path_factory):
-    """A bag with aligned and raw depth of one scene."""
     path = str(tmp_path_factory.mktemp('raw') / 'in.bag')
     write_bag(images(simulator(0.0, D435I_COLOR), simulator(BASELINE_M, DEPTH_CAMERA)), path)
     return path

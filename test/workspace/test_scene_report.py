@@ -89,7 +89,6 @@ def test_tracks_are_written_as_a_table(bag, tmp_path):
 
 
 def write_unindexed(path):
-    """Write a bag whose recording was interrupted."""
     write_bag(images_with_tracks('map'), path)
     with open(path, 'r+b') as stream:
         stream.truncate(os.path.getsize(path) // 2)

@@ -24,7 +24,6 @@ ATTACKS = ['!!python/object/apply:os.system ["touch MARK"]', '!!python/name:os.s
 
 
 def start_of(content):
-    """Identifier of a test."""
     return repr(content[:12]) if isinstance(content, (bytes, str)) else None
 
 

@@ -1,11 +1,13 @@
-"""Event counters: counts, first messages, and rejected inputs."""
+"""What threads of a node share: event counters, and the worker that processes the newest item."""
 import concurrent.futures
 import sys
+import threading
 from unittest import mock
 
 import pytest
 
 from ros_3d_bb.core.event_counter import EventCounter
+from ros_3d_bb.core.latest_worker import NewestWorker
 
 
 @pytest.fixture
@@ -46,3 +48,35 @@ def test_no_count_is_lost_between_threads(events):
             pool.submit(lambda: [events.count('images') for _ in range(5000)])
     sys.setswitchinterval(interval_s)
     assert events.counts == {'images': 20000}
+
+
+def test_only_the_newest_of_the_waiting_items_is_processed():
+    started, may_continue, done = threading.Event(), threading.Event(), threading.Event()
+    processed = []
+
+    def work(item):
+        started.set()
+        assert may_continue.wait(10)
+        processed.append(item)
+        if item == 4:
+            done.set()
+    worker = NewestWorker(work, None)
+    assert not worker.offer(1)
+    assert started.wait(10)
+    assert [worker.offer(item) for item in (2, 3, 4)] == [False, True, True]
+    may_continue.set()
+    assert done.wait(10)
+    worker.stop()
+    assert processed == [1, 4]
+
+
+def test_an_error_is_reported_and_the_next_item_is_processed():
+    errors, failed, done = [], threading.Event(), threading.Event()
+    actions = {'bad': lambda: [][0], 'good': done.set}
+    worker = NewestWorker(lambda item: actions[item](), lambda error: (errors.append(error), failed.set()))
+    worker.offer('bad')
+    assert failed.wait(10)
+    worker.offer('good')
+    assert done.wait(10)
+    worker.stop()
+    assert [type(error) for error in errors] == [IndexError]

@@ -1,7 +1,8 @@
-"""Nodes agree with their docstrings, and the files in config/ with the code."""
+"""Nodes agree with their docstrings, config/ with the code, and Sphinx builds the documentation without a warning."""
 import contextlib
 import functools
 import os
+import subprocess
 import sys
 from unittest import mock
 
@@ -16,8 +17,8 @@ from ros_3d_bb_lab.evaluation.latency.replay_node import ReplayNode
 from ros_3d_bb_lab.evaluation.navigation.navigation_trial_node import NavigationTrialNode
 from ros_3d_bb_lab.simulation.ros.simulator_node import SimulatorNode
 from support.masterless import masterless
+from support.pages import DOC, ROOT, node_pages
 from support.planner_definitions import package
-from support.pages import ROOT, node_pages
 
 CONFIG = node_pages.config_files()
 NODES = {node.name: node for node in node_pages.nodes()}
@@ -83,3 +84,14 @@ def test_a_node_connects_to_the_topics_and_services_of_its_docstring(name):
         if hasattr(node, 'pause_or_resume'):
             node.pause_or_resume()
         assert {call[0][0]: call[0][1]._type for call in proxy.call_args_list} == documented(name, 'Calls')
+
+
+@pytest.mark.slow
+@pytest.mark.needs('sphinx')
+def test_the_site_has_every_page_and_each_link_has_a_target(tmp_path):
+    """Others are errors of Sphinx."""
+    node_pages.main()
+    subprocess.check_call([sys.executable, '-m', 'sphinx', '-W', '--keep-going', '-n', '-q', '-b', 'html',
+                           '-d', str(tmp_path / 'trees'), '-c', DOC, ROOT, str(tmp_path / 'html')])
+    for path in ('index', 'launch_files', 'nodes/tracker_node'):
+        assert (tmp_path / 'html' / 'doc' / (path + '.html')).exists()

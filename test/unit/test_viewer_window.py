@@ -1,4 +1,4 @@
-"""Window content of the viewer, with all or some of the inputs."""
+"""The viewer's window: its content with all or some of the inputs, and its keys."""
 import numpy as np
 import pytest
 
@@ -6,6 +6,7 @@ from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.sessions.snapshots import ColorImage, Snapshot
+from ros_3d_bb.visualization.cv_window import character_of
 from ros_3d_bb.visualization.image_overlay import BOX_COLOR, colorize_depth, depth_to_grey
 from ros_3d_bb.visualization.viewer_layout import RATE_WINDOW_NS, FrameRate, box_lines, compose
 
@@ -57,3 +58,19 @@ def test_the_frame_rate_is_that_of_recent_images_and_its_memory_is_limited():
     assert len(rate._arrivals_ns) <= 31 * RATE_WINDOW_NS // NS
     assert rate.at(2999 * NS // 30) == pytest.approx(30.0)
     assert rate.at(110 * NS) == 0
+
+
+SHIFT, CAPS_LOCK, LEFT, DELETE, NUM_LOCK = 0xffe1, 0xffe5, 0xff51, 0xffff, 0xff7f
+WITH_SHIFT = 1 << 16  # GTK's state of modifiers
+
+
+@pytest.mark.parametrize('code, character', [
+    (ord('a'), 'a'), (ord('A') | WITH_SHIFT, 'A'), (0xf6, 'ö'), (0xd6 - 256, 'ö'), (0xff08, '\b'), (0xff8d, '\r'),
+    (0xffb7, '7'), (27, '\x1b')])
+def test_keys_with_a_character_give_it(code, character):
+    assert character_of(code) == character
+
+
+@pytest.mark.parametrize('code', [-1, SHIFT, SHIFT | WITH_SHIFT, CAPS_LOCK, LEFT, DELETE, NUM_LOCK])
+def test_other_keys_give_none(code):
+    assert character_of(code) == ''

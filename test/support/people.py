@@ -1,0 +1,43 @@
+"""Poses of cameras, and detections of people in front of one at the origin of the map, 1 m up, that looks along x."""
+import numpy as np
+
+from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.tracking.types import CameraView, Detection
+
+
+def mounted(height_m, pitch_deg=0.0, roll_deg=0.0, yaw_deg=0.0):
+    """The transform of a camera above the origin, which looks along x, then turned left, pitched down and rolled."""
+    transform = transform_from((0, 0, height_m), (0, 0, 0, 1))
+    for axis, angle_deg in ((2, yaw_deg), (1, pitch_deg), (0, roll_deg)):
+        half = np.radians(angle_deg) / 2
+        quaternion = np.eye(4)[axis] * np.sin(half) + np.eye(4)[3] * np.cos(half)
+        transform = transform.dot(transform_from((0, 0, 0), quaternion))
+    return transform.dot(transform_from((0, 0, 0), OPTICAL_ROTATION))
+
+
+CAMERA = Camera(640, 480, 533.0, 533.0, 319.5, 239.5)  # sees x from -0.6 to 0.6 of the depth
+VIEW = CameraView(mounted(1.0), CAMERA)
+START_NS = 1000 * NS
+
+
+def at(x, y, height=1.7, cut='', width=0.5, sigma=0.04, **fields):
+    """The detection of someone who stands at a place, truncated at the edges that `cut` names."""
+    edges = tuple(edge in cut for edge in ('left', 'top', 'right', 'bottom'))
+    return Detection(np.array([x, y, height / 2]), np.array([width, width, height]), np.eye(3) * sigma ** 2,
+                     edges)._replace(**fields)
+
+
+def play(tracker, seconds, detections_at, rate_hz=30, start_s=0.0, view=VIEW):
+    """Update the tracker with `detections_at(seconds)`; returns the published tracks of each image."""
+    times_s = [start_s + frame / rate_hz for frame in range(int(seconds * rate_hz))]
+    return [tracker.update(START_NS + int(round(time_s * NS)), detections_at(time_s), view) for time_s in times_s]
+
+
+def standing(*places):
+    """`detections_at` of people who stand at places (x, y)."""
+    return lambda _time_s: [at(*place) for place in places]
+
+
+def ids(objects):
+    return [track.id for track in objects]
