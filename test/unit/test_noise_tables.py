@@ -2,14 +2,16 @@
 import numpy as np
 import pytest
 
-from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.camera_model import transform_points
+from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.sessions.plausibility import FACTORS, likely_errors
 from ros_3d_bb.sessions.session_writer import append
 from ros_3d_bb.sessions.snapshots import ColorImage, Snapshot
 from ros_3d_bb_lab.evaluation.noise.analysis import Inputs, analyse
 from ros_3d_bb_lab.evaluation.noise.statistics import cluster_statistics
 from ros_3d_bb_lab.evaluation.noise.tables import Cluster, MeasurementTable, read_session_measurements, read_table
-from support.cylinders import Cylinder, mounted, render
+from ros_3d_bb_lab.simulation.scenario import scenario_from
+from ros_3d_bb_lab.simulation.simulator import Simulator
 from support.noise_tables import write_table
 from support.small_session import change_json, write_small_session
 
@@ -63,17 +65,21 @@ def test_an_outlier_does_not_remove_the_other_person_of_its_image(tmp_path):
 
 
 def test_people_stand_upright_before_a_tilted_camera(tmp_path):
-    """As if the camera were level, the person would be 0.17 m nearer."""
-    camera, pose = Camera(640, 480, 615.0, 615.0, 319.5, 239.5), mounted(1.8, 30)
-    depth, shown = render(camera, pose, [Cylinder(1.5, 0.3)])
-    rows, columns = np.nonzero(shown == 0)
-    rect_px = int(columns.min()), int(rows.min()), int(columns.max()) + 1, int(rows.max()) + 1
-    append(str(tmp_path), Snapshot(0, ColorImage(np.zeros((480, 640, 3), np.uint8), 'optical'), depth, camera,
-                                   (rect_px,), None, pose[2, :3]))
-    x, _y, z, _one = np.linalg.inv(pose).dot((1.5 - 0.09, 0.3, 0.85, 1.0))  # 0.09 m: the cylinder's front counts more
+    simulator = Simulator(scenario_from({
+        'duration': 0.1, 'rate': 10.0, 'robot': {'mount': [0.0, 0.0, 1.8], 'pitch': np.radians(30)},
+        'people': [{'start': [1.7, 0.3]}]}))
+    frame = simulator.frame(0)
+    camera_from_map, (person,) = np.linalg.inv(frame.poses.map_from_camera), frame.people
+    depth, color = DepthImage(frame.depth_mm, 0.001), ColorImage(frame.color, 'optical')
+    append(str(tmp_path), Snapshot(0, color, depth, simulator.camera, (tuple(person.box_px),), None,
+                                   camera_from_map[:3, 2]))
+    x, _y, z = transform_points(camera_from_map, person.position_m)
     change_json(str(tmp_path), lambda content: content['frames'][0].update(truth_mm={'x': 1000 * x, 'z': 1000 * z}))
     table = read_session_measurements(str(tmp_path), 'foreground')
-    np.testing.assert_allclose(table.measured_m[:, [0, 2]], table.truth_m, atol=0.03)
+    np.testing.assert_allclose(table.measured_m[:, [0, 2]], table.truth_m, atol=0.06)
+    change_json(str(tmp_path), lambda content: content['frames'][0].pop('up'))
+    table = read_session_measurements(str(tmp_path), 'foreground')
+    assert np.abs(table.measured_m[:, 2] - table.truth_m[:, 1]) > 0.1  # as if the camera were level
 
 
 @pytest.mark.parametrize('kind', ['normal', 'laplace', 'standard_cauchy'])

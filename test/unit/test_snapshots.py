@@ -24,7 +24,7 @@ def send(snapshots, number, parts=PARTS):
 
 
 def parts_of(snapshot):
-    return tuple(snapshot)[1:]
+    return tuple(snapshot)[1:6]
 
 
 @pytest.mark.parametrize('order', itertools.permutations(PARTS))
@@ -32,7 +32,7 @@ def test_parts_are_combined_in_any_order(order):
     snapshots = made()
     assert snapshots.newest is None
     send(snapshots, 7, order)
-    assert snapshots.newest == (7 * PERIOD, 7, 7, 7, 7, 7)
+    assert snapshots.newest[:6] == (7 * PERIOD, 7, 7, 7, 7, 7)
 
 
 def test_3d_boxes_have_the_stamp_of_the_depth_image():
@@ -40,7 +40,7 @@ def test_3d_boxes_have_the_stamp_of_the_depth_image():
     send(snapshots, 7, ('color', 'camera', 'boxes2d'))
     snapshots.add_depth(depth_ns, 0, 'depth')
     snapshots.add_boxes3d(depth_ns, 0, 'boxes3d')
-    assert snapshots.newest == (7 * PERIOD, 7, 'depth', 7, 7, 'boxes3d')
+    assert snapshots.newest[:6] == (7 * PERIOD, 7, 'depth', 7, 7, 'boxes3d')
 
 
 @given(st.integers(0, 29), st.integers(0, 5))
