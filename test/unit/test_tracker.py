@@ -102,6 +102,14 @@ def test_boxes_with_the_depth_of_the_background_do_not_move_the_track():
     assert len(errors_m) == 75 and max(errors_m) < 0.15
 
 
+@pytest.mark.parametrize('behind_m', [0.4, 0.6])
+def test_a_new_person_keeps_the_id_after_several_boxes_with_the_depth_of_the_background(behind_m):
+    """They move the track, whose velocity is unknown, so that the next box is nearer than its gate."""
+    walk = play(Tracker(), 1, lambda time_s: [at(3 + behind_m * (3 <= round(30 * time_s) < 10), 0)])
+    assert {track_id for objects in walk for track_id in ids(objects)} == {1}
+    assert max(abs(objects[0].position_m[0] - 3) for objects in walk[14:]) < 0.2
+
+
 def test_a_truncated_box_shows_only_one_side_of_a_person():
     """The centre of the visible half of a body is 0.125 m from that of the person."""
     track, = play(Tracker(), 1, lambda _time_s: [at(3, 1.5, cut='left', width=0.25)])[-1]

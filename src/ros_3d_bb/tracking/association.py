@@ -5,9 +5,9 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.kalman_filter import as_outlier, weighted
+from ros_3d_bb.tracking.kalman_filter import as_misplaced, as_outlier, log_sum, moved_back, weighted
 
-RECENT_NS = 7 * NS // 10  # tracks matched less than this ago are associated before the others; chosen
+RECENT_NS = 6 * NS // 10  # tracks matched less than this ago are associated before the others; chosen
 UNSURE_SHARE = 0.1  # upper bound of the new-target density, relative to the peak density of the detection; chosen
 HEAD_SIGMAS = 2.0  # standard deviation of the head top relative to that of the height; chosen: the camera tilts
 HIDDEN_FEET_COST = 4.0  # cost of a box whose top matches but whose height does not; chosen: its legs are occluded
@@ -21,7 +21,7 @@ def associate(tracks, measurements, stamp_ns, params, outliers):
     A pair is allowed only if the track explains the measurement better than a new target does (the gate), and both
     have the same group of classes. Of the allowed pairs, those are selected that explain all measurements best, with a
     new target where no pair is left. `params` are `tracker.TrackerParams`, `outliers` their OutlierModel. Returns a
-    list of (Track, Measurement).
+    list of (Track, Measurement). Tracks that outliers have moved behind their objects are moved back, in place.
     """
     matches, ranks, taken = [], {}, set()
     for pair, cost in allowed_costs(tracks, measurements, params, outliers).items():
@@ -33,6 +33,9 @@ def associate(tracks, measurements, stamp_ns, params, outliers):
         for row, column in costs if len(costs) == 1 else _assigned(costs):
             matches.append((tracks[row], measurements[column]))
             taken.add(column)
+    for track, measurement in matches:
+        if _is_misplaced(track, measurement, outliers):
+            track.state = moved_back(track.state, measurement.ray_x, measurement.ray_y, outliers)
     return matches
 
 
@@ -74,8 +77,7 @@ def position_cost(x, y, xx, xy, yy, ray_x, ray_y, outliers):
     inlier, _a_x, _a_y, _determinant = weighted(x, y, xx, xy, yy, outliers.log_inliers)
     x, y, xx, xy, yy = as_outlier(x, y, xx, xy, yy, ray_x, ray_y, outliers)
     outlier, _a_x, _a_y, _determinant = weighted(x, y, xx, xy, yy, outliers.log_outliers)
-    larger, smaller = (inlier, outlier) if inlier > outlier else (outlier, inlier)
-    return LOG_TWO_PI - larger - math.log1p(math.exp(smaller - larger))
+    return LOG_TWO_PI - log_sum(inlier, outlier)
 
 
 def position_costs(x, y, xx, xy, yy, ray_x, ray_y, outliers):
@@ -85,17 +87,40 @@ def position_costs(x, y, xx, xy, yy, ray_x, ray_y, outliers):
                                      weighted(*outlier, log_share=outliers.log_outliers, log=np.log)[0])
 
 
+def misplaced_cost(x, y, xx, xy, yy, ray_x, ray_y, outliers, log=math.log):
+    """As `position_cost`, if outliers have moved the track behind its object. With `log` = numpy.log, of arrays."""
+    nearer = as_misplaced(x, y, xx, xy, yy, ray_x, ray_y, outliers)
+    return LOG_TWO_PI - weighted(*nearer, log_share=outliers.log_misplaced, log=log)[0]
+
+
+def _innovation(track, measurement):
+    """Innovation of a pair and its covariance (x, y, xx, xy, yy), and the viewing direction."""
+    state = track.state
+    return (measurement.x - state.x, measurement.y - state.y, state.xx + measurement.xx, state.xy + measurement.xy,
+            state.yy + measurement.yy, measurement.ray_x, measurement.ray_y)
+
+
+def _is_misplaced(track, measurement, outliers):
+    """Whether a measurement fits better if outliers have moved the track, which was detected in the previous image."""
+    if track.unseen_s:
+        return False
+    innovation = _innovation(track, measurement)
+    return misplaced_cost(*innovation, outliers=outliers) < position_cost(*innovation, outliers=outliers)
+
+
 def _likely_pairs(tracks, measurements, gates, outliers):
     """The pairs (row, column, position cost) with costs below those of new targets."""
     pairs = []
     for row, track in enumerate(tracks):
-        x, y, _u, _v, xx, xy, _xu, _xv, yy = track.state[:9]
+        x, y, _u, _v, xx, _xy, _xu, _xv, yy = track.state[:9]
         spread = math.sqrt(xx + yy)
         for column, (measurement, (limit, factor, reach)) in enumerate(zip(measurements, gates)):
-            far, to_x, to_y = factor * spread + reach, measurement.x - x, measurement.y - y
-            if -far < to_x < far and -far < to_y < far:
-                cost = position_cost(to_x, to_y, xx + measurement.xx, xy + measurement.xy, yy + measurement.yy,
-                                     measurement.ray_x, measurement.ray_y, outliers)
+            far = factor * spread + reach
+            if -far < measurement.x - x < far and -far < measurement.y - y < far:
+                innovation = _innovation(track, measurement)
+                cost = position_cost(*innovation, outliers=outliers)
+                if not track.unseen_s:
+                    cost = min(cost, misplaced_cost(*innovation, outliers=outliers))
                 if cost < limit:
                     pairs.append((row, column, cost))
     return pairs
@@ -104,14 +129,16 @@ def _likely_pairs(tracks, measurements, gates, outliers):
 def _likely_pairs_of_crowd(tracks, measurements, gates, outliers):
     """As `_likely_pairs`, by arrays."""
     x, y, xx, xy, yy = np.array([track.state for track in tracks]).T[[0, 1, 4, 5, 8]]
+    was_detected = np.array([not track.unseen_s for track in tracks])
     to_x, to_y, noise_xx, noise_xy, noise_yy, ray_x, ray_y, limits, factors, reaches = np.array([
         (measurement.x, measurement.y, measurement.xx, measurement.xy, measurement.yy, measurement.ray_x,
          measurement.ray_y) + gate for measurement, gate in zip(measurements, gates)]).T
     far = reaches + factors * np.sqrt(xx + yy)[:, None]
     rows, columns = ((np.abs(to_x - x[:, None]) < far) & (np.abs(to_y - y[:, None]) < far)).nonzero()
-    costs = position_costs(to_x[columns] - x[rows], to_y[columns] - y[rows], xx[rows] + noise_xx[columns],
-                           xy[rows] + noise_xy[columns], yy[rows] + noise_yy[columns], ray_x[columns], ray_y[columns],
-                           outliers)
+    innovations = (to_x[columns] - x[rows], to_y[columns] - y[rows], xx[rows] + noise_xx[columns],
+                   xy[rows] + noise_xy[columns], yy[rows] + noise_yy[columns], ray_x[columns], ray_y[columns], outliers)
+    misplaced = np.where(was_detected[rows], misplaced_cost(*innovations, log=np.log), np.inf)
+    costs = np.minimum(position_costs(*innovations), misplaced)
     is_likely = costs < limits[columns]
     return zip(rows[is_likely].tolist(), columns[is_likely].tolist(), costs[is_likely].tolist())
 

@@ -8,7 +8,7 @@ from ros_3d_bb.tracking.track import MIN_TRACK_SCORE, Track, log_odds_of
 # All are chosen; `./run bench tracking` and `./run bench scenes` show the effect of others.
 RECENTLY_MATCHED_NS = NS // 2  # no track starts near a track that was matched less than this ago
 STARTING_SUPPORT = 0.2  # minimum support of a detection that starts a track: most positions with less are wrong
-NEW_NS = NS  # people pass each other later than that after they were first detected
+NEW_NS = 3 * NS // 2  # people pass each other later than that after they were first detected
 SAME_PERSON_M = 0.15  # two people who are both visible cannot be this close to each other
 
 

@@ -2,13 +2,15 @@
 
 Convention: lengths are in metres, times in seconds, in the fixed frame. If the depth of a box is that of the
 background, the measurement lies behind the person on the viewing ray. The measurement error is therefore a mixture of
-two Gaussians, one of them shifted along the ray.
+two Gaussians, one of them shifted along the ray. Several outliers in succession move the track behind the person, too:
+of a track that was detected in the previous image, a second hypothesis is that it is nearer by this shift.
 
 The algebra of 2x2 and 4x4 matrices is written out, because numpy takes several times as long for a few numbers.
 """
 import math
 from typing import NamedTuple
 
+MISPLACED = 0.5  # share of tracks that outliers have moved, relative to that of outliers; chosen
 LEAST_SHARE = 1e-12  # lower bound of the share of a component of the mixture, for its logarithm
 LARGEST_EXPONENT = 700.0  # of math.exp
 
@@ -25,19 +27,21 @@ class State(NamedTuple('State', [(name, float) for name in 'x y u v xx xy xu xv 
 
 
 class OutlierModel(NamedTuple):
-    """Logarithms of the shares of inliers and outliers; mean and variance of the shift of outliers along the ray."""
+    """Logarithms of the shares of inliers, of outliers, and of tracks that outliers have moved; mean and variance of
+    the shift of outliers along the ray."""
 
     log_inliers: float
     log_outliers: float
+    log_misplaced: float
     offset_m: float
     spread_m2: float
 
 
 def outlier_model(params):
     """The OutlierModel of `tracker.TrackerParams`."""
-    log_inliers, log_outliers = (math.log(max(share, LEAST_SHARE))
-                                 for share in (1 - params.outlier_share, params.outlier_share))
-    return OutlierModel(log_inliers, log_outliers, params.outlier_offset, params.outlier_spread ** 2)
+    shares = 1 - params.outlier_share, params.outlier_share, MISPLACED * params.outlier_share
+    log_shares = [math.log(max(share, LEAST_SHARE)) for share in shares]
+    return OutlierModel(*log_shares, offset_m=params.outlier_offset, spread_m2=params.outlier_spread ** 2)
 
 
 def predict(state, elapsed_s, density):
@@ -77,6 +81,17 @@ def as_outlier(x, y, xx, xy, yy, ray_x, ray_y, outliers):
             yy + spread_m2 * ray_y * ray_y)
 
 
+def as_misplaced(x, y, xx, xy, yy, ray_x, ray_y, outliers):
+    """As `as_outlier`, of a track that outliers have moved behind the object."""
+    return as_outlier(x, y, xx, xy, yy, -ray_x, -ray_y, outliers)
+
+
+def log_sum(first, second):
+    """Logarithm of the sum of two numbers, given their logarithms."""
+    larger, smaller = (first, second) if first > second else (second, first)
+    return larger + math.log1p(math.exp(smaller - larger))
+
+
 def update(state, measurement, outliers):
     """The State after a Measurement; the mixture of both components is reduced to one Gaussian.
 
@@ -105,3 +120,11 @@ def update(state, measurement, outliers):
                  xx - x_x * xx - x_y * xy, xy - x_x * xy - x_y * yy, xu - x_x * xu - x_y * yu, xv - x_x * xv - x_y * yv,
                  yy - y_x * xy - y_y * yy, yu - y_x * xu - y_y * yu, yv - y_x * xv - y_y * yv,
                  uu - u_x * xu - u_y * yu, uv - u_x * xv - u_y * yv, vv - v_x * xv - v_y * yv)
+
+
+def moved_back(state, ray_x, ray_y, outliers):
+    """The State of an object behind which outliers have moved its track, given the viewing direction."""
+    offset_m, spread_m2 = outliers.offset_m, outliers.spread_m2
+    return state._replace(x=state.x - offset_m * ray_x, y=state.y - offset_m * ray_y,
+                          xx=state.xx + spread_m2 * ray_x * ray_x, xy=state.xy + spread_m2 * ray_x * ray_y,
+                          yy=state.yy + spread_m2 * ray_y * ray_y)

@@ -23,7 +23,7 @@ HIT_CORRELATION_S = 0.08  # without scores, three images at 30 Hz or two indepen
 MISS_CORRELATION_S = 0.15  # the causes of misses, such as poses and partial occlusion, last longer
 UNKNOWN_SCORE, LARGEST_SCORE = 0.5, 0.9999  # assumed if the score is unknown; upper bound, for its log odds
 # Of the score of a detection. A high score does not mean that the position is right, as of a person half hidden.
-MIN_LOG_ODDS, MAX_LOG_ODDS = -2.0, 1.0
+MIN_LOG_ODDS, MAX_LOG_ODDS = -2.0, 1.1
 HIT = 0.8  # of a detection where a track is expected: little, because false detections repeat at their place, too
 KNOWN_IMAGES = 4  # images that the expected rate of detections counts for, against the observed rate of a new track
 MAX_TRACK_SCORE = 4.0  # earlier evidence is forgotten: an undetected person is published for 0.4 s
