@@ -24,35 +24,39 @@ def associate(tracks, measurements, stamp_ns, params, outliers):
     list of (Track, Measurement). Tracks that outliers have moved behind their objects are moved back, in place.
     """
     matches, ranks, taken = [], {}, set()
-    for pair, cost in allowed_costs(tracks, measurements, params, outliers).items():
+    costs, misplaced = allowed_costs(tracks, measurements, params, outliers)
+    for pair, cost in costs.items():
         track = tracks[pair[0]]
         rank = int(stamp_ns - track.last_ns >= RECENT_NS) if track.is_confirmed else 2
         ranks.setdefault(rank, {})[pair] = cost
     for rank in sorted(ranks):
         costs = {pair: cost for pair, cost in ranks[rank].items() if pair[1] not in taken} if taken else ranks[rank]
         for row, column in costs if len(costs) == 1 else _assigned(costs):
-            matches.append((tracks[row], measurements[column]))
+            track, measurement = tracks[row], measurements[column]
+            if (row, column) in misplaced:
+                track.state = moved_back(track.state, measurement.ray_x, measurement.ray_y, outliers)
+            matches.append((track, measurement))
             taken.add(column)
-    for track, measurement in matches:
-        if _is_misplaced(track, measurement, outliers):
-            track.state = moved_back(track.state, measurement.ray_x, measurement.ray_y, outliers)
     return matches
 
 
 def allowed_costs(tracks, measurements, params, outliers):
     """The costs {(number of the track, number of the measurement): cost} of the allowed pairs, less that of a new
-    target: -log of the density of the measurement given the track, per m², and the cost of their heights.
+    target: -log of the density of the measurement given the track, per m², and the cost of their heights; and the set
+    of the pairs that fit better if outliers have moved the track.
     """
     gates = [_gate(measurement, params.new_target_density, outliers) for measurement in measurements]
     is_crowd = len(tracks) * len(measurements) >= CROWD
     pairs = (_likely_pairs_of_crowd if is_crowd else _likely_pairs)(tracks, measurements, gates, outliers)
-    costs = {}
-    for row, column, cost in pairs:
+    costs, misplaced = {}, set()
+    for row, column, cost, is_misplaced in pairs:
         track, measurement = tracks[row], measurements[column]
         cost += height_cost(track, measurement, params.height_sigma)
         if cost < gates[column][0] and track.kind.group == measurement.kind.group:
             costs[row, column] = cost - gates[column][0]
-    return costs
+            if is_misplaced:
+                misplaced.add((row, column))
+    return costs, misplaced
 
 
 def _gate(measurement, new_target_density, outliers):
@@ -93,36 +97,23 @@ def misplaced_cost(x, y, xx, xy, yy, ray_x, ray_y, outliers, log=math.log):
     return LOG_TWO_PI - weighted(*nearer, log_share=outliers.log_misplaced, log=log)[0]
 
 
-def _innovation(track, measurement):
-    """Innovation of a pair and its covariance (x, y, xx, xy, yy), and the viewing direction."""
-    state = track.state
-    return (measurement.x - state.x, measurement.y - state.y, state.xx + measurement.xx, state.xy + measurement.xy,
-            state.yy + measurement.yy, measurement.ray_x, measurement.ray_y)
-
-
-def _is_misplaced(track, measurement, outliers):
-    """Whether a measurement fits better if outliers have moved the track, which was detected in the previous image."""
-    if track.unseen_s:
-        return False
-    innovation = _innovation(track, measurement)
-    return misplaced_cost(*innovation, outliers=outliers) < position_cost(*innovation, outliers=outliers)
-
-
 def _likely_pairs(tracks, measurements, gates, outliers):
-    """The pairs (row, column, position cost) with costs below those of new targets."""
+    """The pairs (row, column, position cost, whether outliers have moved the track) with costs below those of new
+    targets. Only a track that was detected in the previous image can be misplaced.
+    """
     pairs = []
     for row, track in enumerate(tracks):
-        x, y, _u, _v, xx, _xy, _xu, _xv, yy = track.state[:9]
+        x, y, _u, _v, xx, xy, _xu, _xv, yy = track.state[:9]
         spread = math.sqrt(xx + yy)
         for column, (measurement, (limit, factor, reach)) in enumerate(zip(measurements, gates)):
-            far = factor * spread + reach
-            if -far < measurement.x - x < far and -far < measurement.y - y < far:
-                innovation = _innovation(track, measurement)
-                cost = position_cost(*innovation, outliers=outliers)
-                if not track.unseen_s:
-                    cost = min(cost, misplaced_cost(*innovation, outliers=outliers))
-                if cost < limit:
-                    pairs.append((row, column, cost))
+            far, to_x, to_y = factor * spread + reach, measurement.x - x, measurement.y - y
+            if -far < to_x < far and -far < to_y < far:
+                innovation = (to_x, to_y, xx + measurement.xx, xy + measurement.xy, yy + measurement.yy,
+                              measurement.ray_x, measurement.ray_y, outliers)
+                cost = position_cost(*innovation)
+                nearer_cost = math.inf if track.unseen_s else misplaced_cost(*innovation)
+                if min(cost, nearer_cost) < limit:
+                    pairs.append((row, column, min(cost, nearer_cost), nearer_cost < cost))
     return pairs
 
 
@@ -137,10 +128,11 @@ def _likely_pairs_of_crowd(tracks, measurements, gates, outliers):
     rows, columns = ((np.abs(to_x - x[:, None]) < far) & (np.abs(to_y - y[:, None]) < far)).nonzero()
     innovations = (to_x[columns] - x[rows], to_y[columns] - y[rows], xx[rows] + noise_xx[columns],
                    xy[rows] + noise_xy[columns], yy[rows] + noise_yy[columns], ray_x[columns], ray_y[columns], outliers)
-    misplaced = np.where(was_detected[rows], misplaced_cost(*innovations, log=np.log), np.inf)
-    costs = np.minimum(position_costs(*innovations), misplaced)
-    is_likely = costs < limits[columns]
-    return zip(rows[is_likely].tolist(), columns[is_likely].tolist(), costs[is_likely].tolist())
+    costs = position_costs(*innovations)
+    nearer_costs = np.where(was_detected[rows], misplaced_cost(*innovations, log=np.log), np.inf)
+    least = np.minimum(costs, nearer_costs)
+    is_likely = least < limits[columns]
+    return zip(*(values[is_likely].tolist() for values in (rows, columns, least, nearer_costs < costs)))
 
 
 def height_cost(track, measurement, sigma_m):
