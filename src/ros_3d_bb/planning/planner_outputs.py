@@ -49,7 +49,8 @@ NAMES = ('costmap',) + tuple(sorted(OPTIONAL))
 
 
 def outputs_from(params):
-    """Create the list of Output that the PlannerBridgeParams select. Raises ValueError without one or its package."""
+    """Create the list of Output that the PlannerBridgeParams select. Raises ValueError if there is none, or the package
+    that it needs is not installed."""
     if not params.outputs:
         raise ValueError('parameter ~outputs is empty; some of %s expected' % ', '.join(NAMES))
     found = [_optional_output(name, params) for name in OPTIONAL if name in params.outputs]
