@@ -60,7 +60,7 @@ ALLOWED = {
 MESSAGES = set('genpy actionlib_msgs diagnostic_msgs geometry_msgs nav_msgs rosgraph_msgs sensor_msgs std_msgs '
                'std_srvs tf2_msgs visualization_msgs'.split())
 SETS = {'messages': MESSAGES, 'ros': MESSAGES | set(
-    'diagnostic_updater dynamic_reconfigure rosgraph roslib rospkg rospy tf2_ros'.split())}
+    'dynamic_reconfigure rosgraph roslib rospkg rospy tf2_ros'.split())}
 QT = {'PyQt5', 'python_qt_binding'}
 
 
