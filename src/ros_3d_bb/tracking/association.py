@@ -5,7 +5,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.kalman_filter import as_misplaced, as_outlier, log_sum, moved_back, weighted
+from ros_3d_bb.tracking.kalman_filter import as_outlier, moved_back, weighted
 
 RECENT_NS = 6 * NS // 10  # tracks matched less than this ago are associated before the others; chosen
 UNSURE_SHARE = 0.1  # upper bound of the new-target density, relative to the peak density of the detection; chosen
@@ -81,7 +81,8 @@ def position_cost(x, y, xx, xy, yy, ray_x, ray_y, outliers):
     inlier, _a_x, _a_y, _determinant = weighted(x, y, xx, xy, yy, outliers.log_inliers)
     x, y, xx, xy, yy = as_outlier(x, y, xx, xy, yy, ray_x, ray_y, outliers)
     outlier, _a_x, _a_y, _determinant = weighted(x, y, xx, xy, yy, outliers.log_outliers)
-    return LOG_TWO_PI - log_sum(inlier, outlier)
+    larger, smaller = (inlier, outlier) if inlier > outlier else (outlier, inlier)
+    return LOG_TWO_PI - larger - math.log1p(math.exp(smaller - larger))
 
 
 def position_costs(x, y, xx, xy, yy, ray_x, ray_y, outliers):
@@ -93,7 +94,7 @@ def position_costs(x, y, xx, xy, yy, ray_x, ray_y, outliers):
 
 def misplaced_cost(x, y, xx, xy, yy, ray_x, ray_y, outliers, log=math.log):
     """As `position_cost`, if outliers have moved the track behind its object. With `log` = numpy.log, of arrays."""
-    nearer = as_misplaced(x, y, xx, xy, yy, ray_x, ray_y, outliers)
+    nearer = as_outlier(x, y, xx, xy, yy, -ray_x, -ray_y, outliers)  # the box is before the track
     return LOG_TWO_PI - weighted(*nearer, log_share=outliers.log_misplaced, log=log)[0]
 
 

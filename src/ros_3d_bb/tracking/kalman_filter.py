@@ -81,17 +81,6 @@ def as_outlier(x, y, xx, xy, yy, ray_x, ray_y, outliers):
             yy + spread_m2 * ray_y * ray_y)
 
 
-def as_misplaced(x, y, xx, xy, yy, ray_x, ray_y, outliers):
-    """As `as_outlier`, of a track that outliers have moved behind the object."""
-    return as_outlier(x, y, xx, xy, yy, -ray_x, -ray_y, outliers)
-
-
-def log_sum(first, second):
-    """Logarithm of the sum of two numbers, given their logarithms."""
-    larger, smaller = (first, second) if first > second else (second, first)
-    return larger + math.log1p(math.exp(smaller - larger))
-
-
 def update(state, measurement, outliers):
     """The State after a Measurement; the mixture of both components is reduced to one Gaussian.
 
@@ -124,7 +113,5 @@ def update(state, measurement, outliers):
 
 def moved_back(state, ray_x, ray_y, outliers):
     """The State of an object behind which outliers have moved its track, given the viewing direction."""
-    offset_m, spread_m2 = outliers.offset_m, outliers.spread_m2
-    return state._replace(x=state.x - offset_m * ray_x, y=state.y - offset_m * ray_y,
-                          xx=state.xx + spread_m2 * ray_x * ray_x, xy=state.xy + spread_m2 * ray_x * ray_y,
-                          yy=state.yy + spread_m2 * ray_y * ray_y)
+    x, y, xx, xy, yy = as_outlier(state.x, state.y, state.xx, state.xy, state.yy, ray_x, ray_y, outliers)
+    return state._replace(x=x, y=y, xx=xx, xy=xy, yy=yy)
