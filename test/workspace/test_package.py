@@ -68,6 +68,13 @@ def test_every_import_is_declared_and_every_dependency_is_used():
     assert declared('depend', 'exec_depend') == needed
 
 
+def test_setup_installs_the_debian_package_of_every_ros_module():
+    with open(inside('tools', 'setup.sh')) as stream:
+        installed = set(stream.read().split())
+    ros_modules = imported(python_files()) - set(KEYS) - {'python_qt_binding'}  # PyQt5 is used without it
+    assert set('python3-' + name.replace('_', '-') for name in ros_modules) <= installed
+
+
 @pytest.mark.parametrize('node', ['bbox3d_node', 'tracker_node', 'planner_bridge_node'])
 def test_nodes_that_rarely_draw_images_do_not_load_opencv(node):
     code = 'import sys, ros_3d_bb.nodes.%s; sys.exit("cv2" in sys.modules)' % node
