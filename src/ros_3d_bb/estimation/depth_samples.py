@@ -22,9 +22,10 @@ UPPER_SHARE, LOWER_WEIGHT = 0.55, 0.35
 NEAREST_LAYER_M = 0.001  # nearer distances are 0 in whole millimetres
 UNKNOWN_MM, FARTHEST_LAYER_M = 65535, 65.0  # chosen: 16 bits hold the farthest layer and half a body behind it
 # An object of at least this share of its usual height reaches into the upper part of its rectangle, this share of the
-# rows: it has more than so many samples there. Chosen: a hidden chair appears to have 0.6 of its size, and rectangles
-# of detectors are hardly larger at the top.
-LEAST_SIZE, UPPER_PART, MOST_ABOVE = 0.65, 0.15, 4
+# rows: it has more than so many samples there. The object that it hides a part of is farther by at least this distance.
+# Chosen: a hidden chair appears to have 0.6 of its size, rectangles of detectors are hardly larger at the top, and a box
+# that a person carries is nearer than the trunk by more.
+LEAST_SIZE, UPPER_PART, MOST_ABOVE, LEAST_BEHIND_MM = 0.65, 0.15, 4, 200
 # Half the depth extents of a person with stretched arms, and of the trunk. Chosen: points farther from the trunk are
 # not part of the person, and a wall close behind must not shift the median.
 BODY_HALF_DEPTH_MM, TRUNK_HALF_DEPTH_MM = 350, 250
@@ -35,6 +36,7 @@ FIRST_LAYER_SHARE = 0.5
 # this share of its weight, because a rectangle may be smaller than its object.
 LEAST_OUTLINE, LEAST_INSIDE = 10, 0.3
 OUTLINE_SIGMAS = 2  # chosen: parts of the outline that are no larger than chance count nothing, as of far, noisy people
+FILLED = 0.4  # minimum share of a side of a rectangle that the background behind an object fills; chosen
 END_PERCENT = 5  # of the samples on a body at its upper and at its lower end; chosen: the head, and the feet
 EDGE_PERCENT = 5  # of the samples ignored at the left and at the right; chosen: arms, flying pixels
 # Half width of the kernel that finds the trunk, the densest part of a body with stretched arms, and number of steps.
@@ -47,7 +49,7 @@ BESIDE_TRUNK_M = 0.03
 # Chosen: samples within this distance of the middle of the trunk are above it; a larger share of them in a row is on a
 # head than on raised arms; number of samples of background above it; share of samples of nearer objects, which may hide
 # the head or one side of the trunk.
-HEAD_HALF_WIDTH_M, LEAST_HEAD, LEAST_ABOVE, MOST_IN_FRONT = 0.1, 0.65, 4, 0.05
+HEAD_HALF_WIDTH_M, LEAST_HEAD, LEAST_ABOVE, MOST_IN_FRONT = 0.1, 0.6, 4, 0.05
 # Chosen: a camera with more tilt (sine) sees the floor beside the feet, which is as far away as the body, this high.
 LOOKS_DOWN, FEET_M = np.sin(np.radians(10)), 0.3
 
@@ -114,24 +116,29 @@ class RectSamples(object):
     def _layer_above(self, ahead_mm, layer):
         """The Layer of the object of which a lower one with the given Layer hides a part; None if there is none.
 
-        The lower object is too small, and does not reach into the upper part of the rectangle. What is above it and
-        fills the middle more than the sides is not the background.
+        The lower object, such as a dog or what a person carries, is too small, and does not reach into the upper part
+        of the rectangle. What is above it and fills the middle more than the sides is not the background.
         """
         rows, columns = self.shape
         numbers = _around(ahead_mm, layer.trunk_mm, TRUNK_HALF_DEPTH_MM).nonzero()[0]
         above = int(numbers[min(MOST_ABOVE, len(numbers) - 1)]) // columns
-        if above < UPPER_PART * rows or np.ptp(self._along(1)[numbers]) > self._least_m:
+        if above < UPPER_PART * rows:
+            return None
+        left_out = len(numbers) // 10  # a foot may be as near as what a person carries
+        top_m, bottom_m = self._along(1)[numbers[[left_out, -1 - left_out]]]
+        if bottom_m - top_m > 0.8 * self._least_m:
             return None
         end = above * columns
         above_mm, weights = ahead_mm[:end], self._weights[:end]
         behind = nearest_dominant_layer(above_mm, weights, self._outline[self._outline < end])
         is_masked = 2 * np.count_nonzero(above_mm < UNKNOWN_MM) < end  # as a part of the lower object may be
-        if is_masked or behind.trunk_mm < layer.trunk_mm + BODY_HALF_DEPTH_MM:
+        if is_masked or behind.trunk_mm < layer.trunk_mm + LEAST_BEHIND_MM:
             return None
         on_behind = _around(ahead_mm, behind.trunk_mm, BODY_HALF_DEPTH_MM)
+        on_behind &= ahead_mm > (layer.trunk_mm + behind.trunk_mm) // 2
         beside = np.count_nonzero(on_behind[:end].reshape(above, columns)[:, ::max(columns - 1, 1)])
         share = weights.dot(on_behind[:end]) / weights.sum()
-        if share * 2 * above < beside + OUTLINE_SIGMAS * math.sqrt(beside + 1):
+        if share * 2 * above < beside + math.sqrt(beside + 1):
             return None
         return nearest_dominant_layer(np.where(on_behind, ahead_mm, np.uint16(UNKNOWN_MM)), self._weights)
 
@@ -164,6 +171,13 @@ class RectSamples(object):
     def share(self, on_body):
         """Share of the weight of all samples, with depth or not, that the given samples have."""
         return self._weights.dot(on_body) / self._weights.sum()
+
+    def fill_sides(self, on_body):
+        """Whether the given samples fill both sides of the rectangle; one is enough if the other hardly has depth."""
+        rows, columns = self.shape
+        filled, known = (np.count_nonzero(each.reshape(self.shape)[:, ::max(columns - 1, 1)], axis=0) >= FILLED * rows
+                         for each in (on_body, self._ahead_mm < UNKNOWN_MM))
+        return filled.any() and (filled | ~known).all()
 
     def edges(self, on_body, lowest_m=None):
         """Left and right edge of the body whose samples are given, and the middle of its trunk, metres; those above

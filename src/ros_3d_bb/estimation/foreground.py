@@ -22,19 +22,18 @@ FEW = 0.2  # share of the samples from which on a layer has more than `LEAST_SHA
 LEAST_SUPPORT = 0.1  # minimum share of the samples with depth in the layer for an estimate; chosen
 TALL_M, ARMS_ABOVE_M = 1.8, 0.04  # chosen: people who appear taller may raise their arms so far above their heads
 LEAST_WIDTH_M = 0.05  # chosen: of a body that is one pixel wide
-FILLED = 0.4  # minimum share of both sides of a rectangle that background behind an object fills; chosen
 
 
 def estimate_foreground(depth, rects_px, geometry, kinds):
     """Estimate a box from the depth layer of the object in each rectangle of an image: the nearest layer that is
-    dominant near the middle of the rectangle. Furniture in front of a person is lower than people are, and does not
-    reach the upper edge: what does is the person.
+    dominant near the middle of the rectangle. Furniture in front of a person, or what the person carries, is lower than
+    people are, and does not reach the upper edge: what does is the person.
 
     Background beside and between the limbs may fill most of a rectangle, but it is farther away. Around a person it
     fills the outline of the rectangle, too, as furniture and other people at the sides do. Flying pixels are too sparse
     to form a layer. The position is that of the vertical axis of the object: laterally halfway between the edges of the
-    layer, for people near the middle of the trunk, and behind its mean depth by the distance of its class. Before a
-    tilted camera, its ends are at their own distances: the head of a person who bends is nearer than the feet. The
+    layer, for people near the middle of the trunk, and behind its mean depth by the distance of its class. The ends of
+    the object are at their own distances: the head of a person who bends is nearer than the feet, or farther. The
     height of people does not include raised arms. If the image border truncates the object, it is completed to the
     usual size of its class. All of this is done in the level frame.
 
@@ -121,15 +120,14 @@ def _visible_extents(samples, flat_px, geometry, may_repeat):
     on_body = samples.on_body(layer)
     if count < FEW * on_body.size and samples.share(on_body) < LEAST_SHARE:
         return None
-    if may_repeat and _fills_sides(on_body.reshape(samples.shape)):
+    if may_repeat and samples.fill_sides(on_body):
         return None
     # The mean without the nearest and the farthest tenth is finer than the median, which has the depth resolution.
     layer_m = layer.mean_mm(layer.first + count // 10, layer.end - count // 10) / 1000
     upper, lower = slopes_down(flat_px, geometry)
-    looks_down = geometry.level_axes[1][2] > LOOKS_DOWN
-    # Before a level camera, the distances of the ends hardly matter, and the mean is less noisy.
-    upper_m, lower_m = samples.ends(on_body) if looks_down else (layer_m, layer_m)
+    upper_m, lower_m = samples.ends(on_body)
     top_m, bottom_m = upper_m * upper, lower_m * lower
+    looks_down = geometry.level_axes[1][2] > LOOKS_DOWN
     left_m, right_m, trunk_m = samples.edges(on_body, bottom_m - FEET_M if looks_down else None)
     if bottom_m - top_m > TALL_M:
         left_px, top_px, right_px, bottom_px = flat_px
@@ -137,11 +135,6 @@ def _visible_extents(samples, flat_px, geometry, may_repeat):
         head_m = layer_m * slopes_down(head_px, geometry)[0]
         top_m = head_m if head_m - top_m > ARMS_ABOVE_M else top_m
     return _Extents(left_m, right_m, trunk_m, top_m, bottom_m, layer_m, support)
-
-
-def _fills_sides(on_body):
-    """Whether samples (h, w) on a body fill both sides of a rectangle."""
-    return min(np.count_nonzero(on_body[:, side]) for side in (0, -1)) >= FILLED * len(on_body)
 
 
 def _box(seen, rect_px, truncated, kind, geometry):
