@@ -95,8 +95,9 @@ def test_a_fault_in_a_bag_is_reported_with_its_fix(bag, tmp_path, change, fault,
     assert change is not metres or not command  # before it is fixed
 
 
-def test_names_of_topics_are_given_as_remappings(bag, tmp_path, monkeypatch):
-    monkeypatch.setattr(sys, 'argv', ['doctor', DEPTH[1:] + ':=/front/depth/image_raw'])
+@pytest.mark.parametrize('name', [DEPTH, DEPTH[1:]])
+def test_names_of_topics_are_given_as_remappings(bag, tmp_path, monkeypatch, name):
+    monkeypatch.setattr(sys, 'argv', ['doctor', name + ':=/front/depth/image_raw'])
     assert faults_in(changed(bag, tmp_path, renamed)) == []
 
 

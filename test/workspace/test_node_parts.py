@@ -8,6 +8,7 @@ from unittest import mock
 import numpy as np
 import pytest
 import rospy
+from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 from std_srvs.srv import SetBoolRequest
@@ -109,6 +110,21 @@ def test_an_input_subscribed_while_the_others_are_listed_is_kept():
         subscribers.inputs()
         threads[0].join()
         assert [each.name for each in subscribers.inputs()] == ['first', 'second']
+
+
+def test_a_static_map_that_is_published_once_is_no_silent_input():
+    """Nor does its stamp show that clocks differ. Without a publisher, it is missing."""
+    with mock.patch('rospy.Subscriber') as subscriber, mock.patch.object(subscribers, '_inputs', []) as inputs, \
+            mock.patch.object(subscribers, '_cause_of_silence', return_value='no publishers'), \
+            mock.patch('rospy.get_rostime', lambda: rospy.Time(1000)):
+        subscribers.subscribe('map', OccupancyGrid, lambda _message: None, is_irregular=True)
+        monitor = subscribers.InputMonitor()
+        inputs[0].take(OccupancyGrid(header=Header(stamp=rospy.Time(100))))
+        assert not list(monitor.faults())
+        inputs[0].count, inputs[0].received_s, monitor._began_s = 0, None, -100.0
+        assert not list(monitor.faults())
+        subscriber().get_num_connections.return_value = 0
+        assert list(monitor.faults()) == [('silence on map', 'no publishers')]
 
 
 def test_topics_of_dynamic_reconfigure_are_no_results():

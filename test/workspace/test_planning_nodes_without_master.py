@@ -28,8 +28,8 @@ STAMP_NS = 1000 * NS
 
 
 @contextlib.contextmanager
-def node_with(inputs, *people, age_ns=NS // 10, **params):
-    with masterless(dict(params, inputs=inputs, tf_timeout=0.0)) as connections:
+def node_with(inputs, *people, age_ns=NS // 10, names=(), **params):
+    with masterless(dict(params, inputs=inputs, tf_timeout=0.0), names) as connections:
         node = PeopleRemovalNode()
         connections.now = time_from(STAMP_NS)
         connections.send('/tf', transforms(STAMP_NS))
@@ -96,6 +96,19 @@ def test_pixels_of_people_become_invalid():
         connections.send('~camera_info', camera_info(STAMP_NS))
         values = imgmsg_to_depth(sent(connections, 'depth', image)).values
     assert (values[20:30, 26:38] == 0).all() and (values[depth_mm == 4000] == 4000).all()
+
+
+def test_rectified_depth_has_the_intrinsics_of_the_rectified_camera():
+    """A wide camera, whose raw images are magnified."""
+    info = camera_info(STAMP_NS, focal=90.0)
+    info.D, info.P = [-0.3, 0.1, 0.0, 0.0, 0.0], [60, 0, 31.5, 0, 0, 60, 23.5, 0, 0, 0, 1, 0]
+    image = fill_image(Image(header=Header(stamp=time_from(STAMP_NS), frame_id='camera')),
+                       np.full((48, 64), 2000, np.uint16), '16UC1')
+    topics = {'~depth': '/camera/depth_registered/image_rect'}
+    with node_with('depth', walking(2.0, 0.3), names=topics) as connections:
+        connections.send('~camera_info', info)
+        values = imgmsg_to_depth(sent(connections, 'depth', image)).values
+    assert np.flatnonzero(values[24] == 0).mean() == pytest.approx(31.5 - 0.3 / 2 * 60, abs=1)
 
 
 @pytest.mark.parametrize('people', [(), (walking(2.0, 0.0),)])

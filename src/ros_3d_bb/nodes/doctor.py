@@ -53,7 +53,7 @@ def main():
 
 def bag_findings(arguments):
     """Return the findings about a bag, the next command, and what it does; empty if there is none."""
-    names = dict(remapping.split(':=') for remapping in sys.argv if ':=' in remapping)
+    names = dict(remapping.lstrip('/').split(':=') for remapping in sys.argv if ':=' in remapping)
 
     def name_of(topic):
         wanted = name_for(arguments.camera, topic)

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import rospy
 import tf2_ros
-from sensor_msgs.msg import CameraInfo, Image, LaserScan, PointCloud2
+from sensor_msgs.msg import Image, LaserScan, PointCloud2
 
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.conversions.camera_msgs import uncompressed
@@ -16,7 +16,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.latest_tracks import LatestTracks
 from ros_3d_bb.nodes.common.startup import read_params, run_node
-from ros_3d_bb.nodes.common.subscribers import subscribe
+from ros_3d_bb.nodes.common.subscribers import subscribe, subscribe_camera_info
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.planning.people_removal import are_inside, cylinders_of, pixels_inside, scan_points
 
@@ -80,7 +80,7 @@ class PeopleRemovalNode(object):
         removers = {'scan': self._without_in_scan, 'points': self._without_in_cloud, 'depth': self._without_in_depth}
         self._pubs = {name: rospy.Publisher('~%s_static' % name, KINDS[name], queue_size=2) for name in params.inputs}
         if 'depth' in params.inputs:
-            subscribe('~camera_info', CameraInfo, self._on_camera_info, 1)
+            subscribe_camera_info('~camera_info', '~depth', self._on_camera_info, 1)
         for name in params.inputs:
             subscribe('~' + name, KINDS[name], functools.partial(self._on_message, name, removers[name]), 2)
 

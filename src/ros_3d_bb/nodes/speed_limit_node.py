@@ -68,7 +68,7 @@ class SpeedLimitNode(object):
         self._limit_pub = rospy.Publisher('~speed_limit', Float32, queue_size=1)
         self._velocity_pub = rospy.Publisher('cmd_vel', Twist, queue_size=1)
         self._tracks = RobotTracks(self._diagnostics, self._params)
-        subscribe('cmd_vel_in', Twist, self._on_command, 1)
+        subscribe('cmd_vel_in', Twist, self._on_command, 1, is_irregular=True)
         if self._params.use_scan:
             subscribe('scan', LaserScan, self._on_scan, 1)
         ReconfigureServer(given, self._reconfigure)

@@ -73,7 +73,7 @@ class TrackerNode(object):
         for camera in self._stage.cameras:
             self._subscribe(camera, params.depth, part.subscribes)
         if params.use_map:
-            subscribe('map', OccupancyGrid, self._on_map, 1)
+            subscribe('map', OccupancyGrid, self._on_map, 1, is_irregular=True)
         self._markers.areas_m = self._stage.ignored_areas
         ReconfigureServer(given, self._reconfigure, part.namespace)
 

@@ -100,7 +100,7 @@ def misplaced_cost(x, y, xx, xy, yy, ray_x, ray_y, outliers, log=math.log):
 
 def _likely_pairs(tracks, measurements, gates, outliers):
     """The pairs (row, column, position cost, whether outliers have moved the track) with costs below those of new
-    targets. Only a track that was detected in the previous image can be misplaced.
+    targets.
     """
     pairs = []
     for row, track in enumerate(tracks):
@@ -112,7 +112,7 @@ def _likely_pairs(tracks, measurements, gates, outliers):
                 innovation = (to_x, to_y, xx + measurement.xx, xy + measurement.xy, yy + measurement.yy,
                               measurement.ray_x, measurement.ray_y, outliers)
                 cost = position_cost(*innovation)
-                nearer_cost = math.inf if track.unseen_s else misplaced_cost(*innovation)
+                nearer_cost = misplaced_cost(*innovation) if track.may_be_misplaced else math.inf
                 if min(cost, nearer_cost) < limit:
                     pairs.append((row, column, min(cost, nearer_cost), nearer_cost < cost))
     return pairs
@@ -121,7 +121,7 @@ def _likely_pairs(tracks, measurements, gates, outliers):
 def _likely_pairs_of_crowd(tracks, measurements, gates, outliers):
     """As `_likely_pairs`, by arrays."""
     x, y, xx, xy, yy = np.array([track.state for track in tracks]).T[[0, 1, 4, 5, 8]]
-    was_detected = np.array([not track.unseen_s for track in tracks])
+    may_be_misplaced = np.array([track.may_be_misplaced for track in tracks])
     to_x, to_y, noise_xx, noise_xy, noise_yy, ray_x, ray_y, limits, factors, reaches = np.array([
         (measurement.x, measurement.y, measurement.xx, measurement.xy, measurement.yy, measurement.ray_x,
          measurement.ray_y) + gate for measurement, gate in zip(measurements, gates)]).T
@@ -130,7 +130,7 @@ def _likely_pairs_of_crowd(tracks, measurements, gates, outliers):
     innovations = (to_x[columns] - x[rows], to_y[columns] - y[rows], xx[rows] + noise_xx[columns],
                    xy[rows] + noise_xy[columns], yy[rows] + noise_yy[columns], ray_x[columns], ray_y[columns], outliers)
     costs = position_costs(*innovations)
-    nearer_costs = np.where(was_detected[rows], misplaced_cost(*innovations, log=np.log), np.inf)
+    nearer_costs = np.where(may_be_misplaced[rows], misplaced_cost(*innovations, log=np.log), np.inf)
     least = np.minimum(costs, nearer_costs)
     is_likely = least < limits[columns]
     return zip(*(values[is_likely].tolist() for values in (rows, columns, least, nearer_costs < costs)))

@@ -15,8 +15,8 @@ import numpy as np
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking import kalman_filter
-from ros_3d_bb.tracking.types import (NOT_DETECTED, PREDICTION_STEP, PREDICTION_TIME, VISIBLE, TrackedObject,
-                                      prediction_times_s)
+from ros_3d_bb.tracking.types import (NOT_DETECTED, OUT_OF_VIEW, PREDICTION_STEP, PREDICTION_TIME, VISIBLE,
+                                      TrackedObject, prediction_times_s)
 
 # All are chosen; `./run bench tracking` and `./run bench scenes` show the effect of others.
 HIT_CORRELATION_S = 0.08  # without scores, three images at 30 Hz or two independent ones confirm a track by default
@@ -142,6 +142,12 @@ class Track(object):
         self.slow_mps = 0.0, 0.0
         self.log_odds, self.is_confirmed, self.is_moving = log_odds_of(detection.score, even_log_odds), False, False
         self.votes = {measurement.kind.label: _vote(detection.score)}
+
+    @property
+    def may_be_misplaced(self):
+        """Whether outliers may have moved this track: it was detected in the latest image, and is in view of one
+        camera only. The boxes of several cameras also differ where their poses are wrong."""
+        return not self.unseen_s and sum(seen != OUT_OF_VIEW for seen in self.visibility.values()) == 1
 
     def predicted(self, elapsed_s, acceleration):
         """A copy of this track `elapsed_s` later, not detected, given the acceleration density of people."""

@@ -27,8 +27,9 @@ _inputs, _lock = [], threading.Lock()  # of the process, which is one node
 class Input(object):
     """Statistics of the messages received on a topic of the node."""
 
-    def __init__(self, name, kind):
+    def __init__(self, name, kind, is_irregular=False):
         self.name, self._kind, self.callbacks, self.subscriber = name, kind, [], None
+        self.is_irregular = is_irregular
         self.count, self.received_s, self._newest = 0, None, None  # `received_s` on time.monotonic()
         self.reported_count = 0  # at the last report of the rate
         self.silence, self.queried_s = '', -QUERY_PERIOD_S  # cause of a silence, and when the master was asked for it
@@ -64,8 +65,9 @@ class Input(object):
                       machine_lag_s=machine_s - stamp.to_sec() if has_lag else None)
 
 
-def subscribe(topic, kind, callback, at_once=AT_ONCE):
+def subscribe(topic, kind, callback, at_once=AT_ONCE, is_irregular=False):
     """Subscribe with TCP_NODELAY to a topic whose messages are recorded, see `inputs`. Returns a function that ends it.
+    Of a topic that is irregular, such as a static map, only a missing publisher is a fault.
 
     Without TCP_NODELAY, the kernel delays small messages by up to 40 ms, until previous ones are acknowledged. With
     the kind Image, each publisher may send any of `camera_msgs.IMAGE_KINDS`, and the callback receives that type. A
@@ -77,7 +79,7 @@ def subscribe(topic, kind, callback, at_once=AT_ONCE):
         if shared is not None:
             shared.callbacks.append(callback)
             return lambda: shared.remove(callback)
-        created = Input(topic, kind)
+        created = Input(topic, kind, is_irregular)
         created.callbacks.append(callback)
     created.subscriber = rospy.Subscriber(topic, rospy.AnyMsg if is_image else kind, created.take, queue_size=at_once,
                                           tcp_nodelay=True, buff_size=IMAGE_BUFFER if is_image else SMALL_BUFFER)
@@ -128,6 +130,8 @@ class InputMonitor(object):
             yield 'no clock', '%s; %s' % NO_CLOCK
             return
         for each in inputs():
+            if each.is_irregular and (each.count or each.subscriber.get_num_connections()):
+                continue
             silent_s = now_s - (each.received_s or self._began_s)
             if silent_s > SILENT_S:
                 yield 'silence on ' + each.name, self._silence(each, now_s, silent_s)
