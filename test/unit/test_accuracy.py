@@ -1,4 +1,3 @@
-"""The accuracy benchmark: scores of known errors, and the bars on the real measurements."""
 import os
 
 import numpy as np

@@ -1,4 +1,3 @@
-"""Annotation of a session: edits, which are saved immediately and can be undone, estimates, and invalid sessions."""
 import os
 
 import cv2

@@ -1,4 +1,3 @@
-"""Table of a session as CSV, and the annotator's command line: analysis and validation without a window, Qt and ROS."""
 import csv
 import json
 import os

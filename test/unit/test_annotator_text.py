@@ -1,4 +1,3 @@
-"""Lengths, and floor marks from tables as text."""
 import re
 
 import pytest

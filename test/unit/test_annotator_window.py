@@ -1,4 +1,3 @@
-"""The annotator's window: key presses and clicks, all kinds of sessions, other programs, export and analysis."""
 import os
 
 import cv2

@@ -1,4 +1,3 @@
-"""The costs of pairs of tracks and measurements: the same for few and for many, and for any first look; and matches."""
 from unittest import mock
 
 import numpy as np

@@ -1,4 +1,3 @@
-"""3D box estimators: recorded positions and grid of the thesis, people before others, distortion, and invalid input."""
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st

@@ -1,4 +1,3 @@
-"""Cameras and transforms: inverses and rejected values; cameras in portrait orientation or upside down."""
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st

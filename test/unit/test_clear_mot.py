@@ -1,4 +1,3 @@
-"""CLEAR MOT scores: ID switches, coverage, errors, unmatched people and tracks."""
 import contextlib
 import io
 

@@ -1,4 +1,3 @@
-"""Compressed images of every codec, and data that are damaged or declare an absurd size."""
 import struct
 import zlib
 from types import SimpleNamespace

@@ -1,4 +1,3 @@
-"""Costs of predicted positions around the robot, against the probability of presence."""
 import numpy as np
 import pytest
 

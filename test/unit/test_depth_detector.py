@@ -1,4 +1,3 @@
-"""People detector in depth and colour, on drawn rooms and on the frames of a measurement session."""
 import cv2
 import numpy as np
 import pytest

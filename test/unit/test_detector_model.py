@@ -1,4 +1,3 @@
-"""Detector model: from recordings with ground truth to the tracker."""
 import sys
 import tracemalloc
 from types import SimpleNamespace

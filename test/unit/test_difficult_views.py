@@ -1,4 +1,3 @@
-"""Positions where cameras are tilted, people overlap, or the image border truncates them, on simulated scenes."""
 import numpy as np
 import pytest
 

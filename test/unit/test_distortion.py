@@ -1,4 +1,3 @@
-"""Lens distortion over the whole image: compared with OpenCV and librealsense, inverses, and invalid coefficients."""
 import operator
 
 import cv2

@@ -1,4 +1,3 @@
-"""World with a robot that obeys commands: motion, limits, timeout, collisions, and people who give way."""
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st

@@ -1,4 +1,3 @@
-"""Error models: correction of the bias, covariance inside and outside of the measured range, and files."""
 import glob
 import os
 

@@ -1,4 +1,3 @@
-"""Fit of error models: known models are recovered, and the scores are those of held-out positions."""
 import numpy as np
 import pytest
 

@@ -1,4 +1,3 @@
-"""Following one person: the choice of the track, the recovery, and the motion of a robot that obeys the commands."""
 import numpy as np
 import pytest
 

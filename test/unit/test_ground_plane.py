@@ -1,4 +1,3 @@
-"""Ground plane: fitted at any height and tilt of the camera, and None if no floor is visible."""
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st

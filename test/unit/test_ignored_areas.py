@@ -1,4 +1,3 @@
-"""Polygons and cells of a map in which no track starts, and people who walk through them."""
 import numpy as np
 import pytest
 from hypothesis import given

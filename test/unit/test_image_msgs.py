@@ -1,4 +1,3 @@
-"""Image messages of every layout, and messages whose data do not match their fields."""
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,4 +1,3 @@
-"""The filter's laws: predictions, the mixture of inliers and outliers, and costs."""
 from types import SimpleNamespace
 
 import numpy as np

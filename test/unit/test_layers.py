@@ -1,4 +1,3 @@
-"""Which folder may import what, without cycles."""
 import ast
 import functools
 import os

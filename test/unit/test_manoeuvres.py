@@ -1,6 +1,3 @@
-"""Manoeuvres: people who start to run, turn, stop or sit down between two images of a slow detector, and people whom it
-finds now and then.
-"""
 import math
 
 import numpy as np

@@ -1,4 +1,3 @@
-"""Benchmark of navigation: its scenes, the pace of the simulated time, and the summary of trials."""
 import pytest
 
 from ros_3d_bb.core.time_sync import NS

@@ -1,4 +1,3 @@
-"""Detector that runs a network: resizing, selection, suppression, an input size that keeps up, people in a session."""
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st

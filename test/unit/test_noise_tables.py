@@ -1,4 +1,3 @@
-"""Reader of measurements for the noise analysis, statistics of their clusters, and the plausibility of truth."""
 import numpy as np
 import pytest
 

@@ -1,4 +1,3 @@
-"""Table of classes: the file, its validation, and distances to the axis."""
 import os
 
 import numpy as np

@@ -1,4 +1,3 @@
-"""Cache of ONNX exports: checkpoints are exported once, cached files are verified, and failures are worked around."""
 import hashlib
 import os
 import subprocess

@@ -1,4 +1,3 @@
-"""Heads of detection networks: recognition by the outputs, and decoding of known boxes."""
 import numpy as np
 import pytest
 

@@ -1,4 +1,3 @@
-"""Detectors in ONNX files: agreement with ultralytics, input formats, YAML files beside them, and rejected files."""
 import os
 
 import numpy as np

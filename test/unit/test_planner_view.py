@@ -1,4 +1,3 @@
-"""Positions of people at the current time, frames and footprints, and which points show people."""
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st

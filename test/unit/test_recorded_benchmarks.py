@@ -1,4 +1,3 @@
-"""Benchmarks on recorded data: 3D detections as runs of the tracking benchmark, and predictions by kind of motion."""
 import json
 
 import numpy as np

@@ -1,4 +1,3 @@
-"""Registration of raw depth, and recognition of depth that is not aligned to colour."""
 import re
 
 import numpy as np

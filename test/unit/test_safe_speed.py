@@ -1,4 +1,3 @@
-"""The highest safe speed against the motion of the robot and people that it assumes, also before blind corners."""
 import time
 
 import numpy as np

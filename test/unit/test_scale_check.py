@@ -1,4 +1,3 @@
-"""Scale of depth: found by the heights of people, and not doubted for children, seated people or tilted cameras."""
 import numpy as np
 import pytest
 

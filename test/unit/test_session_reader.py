@@ -1,4 +1,3 @@
-"""Reader of measurement sessions: their content, and errors for sessions that cannot be read."""
 import os
 
 import cv2

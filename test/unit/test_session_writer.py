@@ -1,4 +1,3 @@
-"""Writer of measurement sessions: measurements are appended atomically, and read back unchanged."""
 import multiprocessing
 import os
 import pathlib

@@ -1,4 +1,3 @@
-"""Renderer compared with ray casting."""
 import cv2
 import numpy as np
 import pytest

@@ -1,4 +1,3 @@
-"""Scenario files: values, and errors; their people as actors of Gazebo, and true tracks from its model states."""
 import xml.etree.ElementTree as ElementTree
 from types import SimpleNamespace
 

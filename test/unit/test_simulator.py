@@ -1,4 +1,3 @@
-"""Simulator: frames of a scenario, and their ground truth."""
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,4 +1,3 @@
-"""Snapshots combine the messages of one image for any order of arrival and delay, at once or in a burst."""
 import itertools
 
 import pytest

@@ -1,4 +1,3 @@
-"""Simulated D435i: shadows beside people, and quantisation of depth."""
 import numpy as np
 import pytest
 

@@ -1,4 +1,3 @@
-"""The thesis' tracker: IDs, velocities from the stamps of images, and age of tracks."""
 import numpy as np
 import pytest
 

@@ -1,4 +1,3 @@
-"""What threads of a node share: event counters, and the worker that processes the newest item."""
 import concurrent.futures
 import sys
 import threading

@@ -1,4 +1,3 @@
-"""Synchronization by stamp at any delay, in any order and after a jump back, and which of several cameras is right."""
 import pytest
 from hypothesis import given, strategies as st
 

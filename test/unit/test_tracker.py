@@ -1,4 +1,3 @@
-"""The tracker: IDs, velocities and predictions of people who walk, are occluded, leave and reappear."""
 import numpy as np
 import pytest
 

@@ -1,4 +1,3 @@
-"""Classes of objects in the trackers: labels, filtered scores, groups, and the detection of each track."""
 import pytest
 
 from ros_3d_bb.core.object_classes import ObjectClasses

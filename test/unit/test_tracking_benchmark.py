@@ -1,4 +1,3 @@
-"""The runs and trackers of the benchmark, and the command."""
 import json
 
 import numpy as np

@@ -1,4 +1,3 @@
-"""Laws of the tracker that hold for any camera, any place on the map and any permitted covariance."""
 import warnings
 
 import numpy as np

@@ -1,4 +1,3 @@
-"""Scores of the tracking benchmark on cases with known answers."""
 import numpy as np
 import pytest
 

@@ -1,4 +1,3 @@
-"""The viewer's window: its content with all or some of the inputs, and its keys."""
 import numpy as np
 import pytest
 

@@ -1,4 +1,3 @@
-"""Inference backends: equal predictions, and errors for files and parameters that cannot be used."""
 import json
 import sys
 

@@ -1,4 +1,3 @@
-"""YOLOv5 checkpoints and their networks: reading, published sizes, and rejection of damaged and malicious files."""
 import pickle
 import re
 import zipfile

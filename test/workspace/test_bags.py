@@ -1,4 +1,3 @@
-"""Bags of sessions and scenarios: pixels, intrinsics, and transforms of a robot in the map."""
 import json
 import os
 import sys

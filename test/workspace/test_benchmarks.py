@@ -1,4 +1,3 @@
-"""Benchmarks under roslaunch: what each mode of navigation starts, one trial, and the latency for a few seconds."""
 import json
 import os
 import signal

@@ -1,4 +1,3 @@
-"""bbox3d_node and depth_detector_node without a master: boxes, 2D boxes without a stamp, floors, and debug images."""
 import numpy as np
 import pytest
 from sensor_msgs.msg import Image

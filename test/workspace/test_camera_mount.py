@@ -1,4 +1,3 @@
-"""Cameras that are rotated, tilted, or without tf: the same positions as from an upright camera on a robot."""
 import argparse
 import re
 from unittest import mock

@@ -1,4 +1,3 @@
-"""Several cameras without a master: in bags, in the nodes' callbacks, and in launch files."""
 import pytest
 import rosbag
 

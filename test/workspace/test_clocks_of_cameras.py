@@ -1,4 +1,3 @@
-"""Stamps of one of several cameras, or of all, that leap ahead or back, lag or hang: which images are lost."""
 import pytest
 
 from ros_3d_bb.conversions.perception_msgs import stamp_of

@@ -1,4 +1,3 @@
-"""From observations to faults and their fixes: each fault alone in a working pipeline."""
 from types import SimpleNamespace
 
 import numpy as np

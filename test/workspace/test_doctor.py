@@ -1,4 +1,3 @@
-"""The command doctor without a graph: bags, and no master; and the checks that nodes make themselves."""
 import argparse
 import socket
 import subprocess

@@ -1,4 +1,3 @@
-"""Estimation stage: effect of one invalid 2D box on the others of its image, and the parameter ~error_model."""
 import contextlib
 import os
 

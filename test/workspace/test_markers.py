@@ -1,4 +1,3 @@
-"""Markers: content of each kind; they are updated while a track exists, and deleted when it ends."""
 import numpy as np
 import pytest
 from visualization_msgs.msg import Marker

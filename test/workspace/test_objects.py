@@ -1,4 +1,3 @@
-"""A scene with a person, a dog, a trolley that is pushed and a chair, from true 2D boxes with classes to tracks."""
 import pytest
 
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms

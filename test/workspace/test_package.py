@@ -1,4 +1,3 @@
-"""The package as a whole: dependencies, parameters, launch files and RViz configuration are consistent."""
 import ast
 import glob
 import os

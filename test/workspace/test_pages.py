@@ -1,4 +1,3 @@
-"""Nodes agree with their docstrings, config/ with the code, and Sphinx builds the documentation without a warning."""
 import contextlib
 import functools
 import os

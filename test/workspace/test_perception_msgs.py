@@ -1,4 +1,3 @@
-"""Conversions between messages and types of this package: round trips, rejected messages, and camera_info."""
 import numpy as np
 import pytest
 from geometry_msgs.msg import Point, Vector3

@@ -1,4 +1,3 @@
-"""planner_bridge_node without a master: invalid tracks, missing transforms and jumps of the clock."""
 import contextlib
 import sys
 from unittest import mock

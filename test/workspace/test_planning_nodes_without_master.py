@@ -1,4 +1,3 @@
-"""people_removal_node, speed_limit_node and follow_node without a master: what passes, and which goals are sent."""
 import contextlib
 
 import numpy as np

@@ -1,4 +1,3 @@
-"""process_bag: the messages that the nodes would publish, identical bytes for equal input, and broken bags."""
 import filecmp
 import os
 import re

@@ -1,4 +1,3 @@
-"""Raw depth, registered by the pipeline: the same positions as depth that is aligned to colour."""
 import numpy as np
 import pytest
 from std_msgs.msg import Header

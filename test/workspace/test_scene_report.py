@@ -1,4 +1,3 @@
-"""Report on the bag of a scene."""
 import csv
 import os
 import re

@@ -1,4 +1,3 @@
-"""Malicious files: no code in them is executed, and they cannot exhaust the memory."""
 import glob
 import json
 import os

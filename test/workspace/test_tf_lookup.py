@@ -1,4 +1,3 @@
-"""Transforms for several cameras, without a master."""
 import threading
 
 import numpy as np

@@ -1,4 +1,3 @@
-"""From 3D boxes and transforms to tracks, without a master: effects of one invalid or untimely message on the next."""
 import os
 
 import numpy as np

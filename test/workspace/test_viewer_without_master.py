@@ -1,4 +1,3 @@
-"""viewer_node without a master: what it stores."""
 from fuzz import hostile
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.viewer_node import ViewerNode
