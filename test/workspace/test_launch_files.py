@@ -20,7 +20,10 @@ LOCAL, GLOBAL = '/move_base/local_costmap/', '/move_base/global_costmap/'
 OF_USER = ('navigation.launch frame_world:=my_map odom_frame:=my_odom robot_frame:=my_base scan_topic:=my_scan '
            'odom_topic:=my_odometry map_topic:=my_map_topic cmd_vel_topic:=my_cmd_vel')
 MOUNT = '0.17 0 0.20 0 0 0 base_link camera_link'
-# A command, and what it sets: parameters, `nodes`, `TYPE:TOPIC` for a remapping and `COSTMAP layers`.
+ON_ROBOT = 'jackal.launch driver:=pyrealsense2 planner:=costmap '
+ROBOT_NODES = ['camera_mount', 'people_node', 'planner_bridge_node', 'realsense_node']
+# A command, and what it sets: parameters, `nodes`, those that are `remote` or `respawned`, `TYPE:TOPIC` for a
+# remapping, and `COSTMAP layers`.
 CASES = [
     (MEASURE, {'nodes': ['people_node', 'viewer_node'], '/viewer_node/session': '/a session',
                '/viewer_node/window': True, '/tracker_node/target_frame': 'map',
@@ -82,13 +85,19 @@ CASES = [
         '/bbox3d_node/floor_frame': 'map', '/depth_detector_node/floor_frame': 'map',
         '/depth_detector_node/floor_height': 0, '/tracker_node/target_frame': 'map'}),
     ('simulation.launch rviz:=false error_model:=none', {
-        '/bbox3d_node/floor_frame': 'base_link', '/bbox3d_node/error_model': None, '/tracker_node/error_model': None})]
+        '/bbox3d_node/floor_frame': 'base_link', '/bbox3d_node/error_model': None, '/tracker_node/error_model': None}),
+    (ON_ROBOT + 'computer:=192.168.131.20', {
+        'nodes': ROBOT_NODES, 'respawned': ROBOT_NODES, 'remote': ['people_node', 'planner_bridge_node']}),
+    (ON_ROBOT + 'respawn:=false', {'respawned': []}),
+    ('pipeline.launch planner:=costmap weights:=yolov5n.pt', {'respawned': []})]  # errors would be logged repeatedly
 
 
 @pytest.mark.parametrize('command, expected', CASES, ids=[command for command, _expected in CASES])
 def test_arguments_set_parameters_nodes_and_topics(command, expected):
     found, nodes = loaded(*shlex.split(command))
     found['nodes'] = sorted(nodes)
+    found['remote'] = sorted(name for name, node in nodes.items() if node.machine_name == 'people')
+    found['respawned'] = sorted(name for name, node in nodes.items() if node.respawn)
     for node in nodes.values():
         found.update(('%s:%s' % (node.type, topic), target) for topic, target in node.remap_args)
     for costmap in ('local', 'global'):
@@ -136,8 +145,31 @@ def test_the_footprint_of_the_local_planner_and_the_costmaps_is_one():
             == parameters['/move_base/TebLocalPlannerROS/footprint_model/vertices'])
 
 
+# With a stand-in for the driver, which rejects arguments that are not those of the release.
+WITH_DRIVER = [
+    ('realsense.launch camera:=front serial_no:=0123 fps:=15 width:=848 initial_reset:=true exposure:=0.008', {
+        '/stub/camera': 'front', '/stub/initial_reset': 'true', '/stub/color_width': '848', '/stub/depth_width': '848',
+        '/stub/color_fps': '15', '/stub/depth_fps': '15', '/front/rgb_camera/enable_auto_exposure': False,
+        '/front/rgb_camera/exposure': 80}),  # in units of the sensor
+    ('measure.launch camera:=true detector:=depth session:=/a', {
+        '/stub/align_depth': 'true', '/tracker_node/target_frame': 'camera_link',
+        '/depth_detector_node/floor_frame': ''}),
+    ('jackal.launch weights:=/some/yolov5n.pt fps:=15 planner:=costmap frame_world:=odom error_model:=/model.yaml', {
+        '/stub/align_depth': 'true', '/stub/color_fps': '15', '/stub/respawn': 'true',
+        '/yolov5_node/weights': '/some/yolov5n.pt', '/tracker_node/target_frame': 'odom',
+        '/planner_bridge_node/outputs': 'costmap', '/bbox3d_node/error_model': '/model.yaml',
+        '/tracker_node/error_model': '/model.yaml'})]
+
+
+@pytest.mark.parametrize('command, expected', WITH_DRIVER)
+def test_arguments_are_given_to_the_driver(camera_package, command, expected):
+    name, *arguments = command.split()
+    parameters = dumped(name, camera_package, *arguments)
+    assert {key: parameters.get(key) for key in expected} == expected
+    assert 'serial_no' not in command or parameters['/stub/serial_no'].lstrip('0') == '123'
+
+
 def test_the_driver_aligns_depth_to_colour_of_the_same_size_and_rate(camera_package):
-    """The stand-in rejects arguments that are not those of the release. The exposure is in units of the sensor."""
     parameters = dumped('realsense.launch', camera_package)
     assert given_to_stand_ins(parameters) == {
         'align_depth': 'true', 'camera': 'camera', 'initial_reset': 'false', 'color_width': '640',
@@ -145,33 +177,6 @@ def test_the_driver_aligns_depth_to_colour_of_the_same_size_and_rate(camera_pack
         'respawn': 'false'}
     assert parameters['/camera/rgb_camera/enable_auto_exposure'] is True
     assert parameters['/camera/rgb_camera/auto_exposure_priority'] is False
-    parameters = dumped('realsense.launch', camera_package, 'camera:=front', 'serial_no:=0123', 'fps:=15',
-                        'width:=848', 'initial_reset:=true', 'exposure:=0.008')
-    given = given_to_stand_ins(parameters)
-    assert given['camera'] == 'front' and given['initial_reset'] == 'true'
-    assert (given['color_width'], given['depth_width'], given['color_fps'], given['depth_fps']) == (
-        '848', '848', '15', '15')
-    assert given['serial_no'].lstrip('0') == '123'
-    assert parameters['/front/rgb_camera/enable_auto_exposure'] is False
-    assert parameters['/front/rgb_camera/exposure'] == 80
-
-
-def test_a_measured_camera_aligns_depth_and_its_frame_is_the_target(camera_package):
-    parameters = dumped('measure.launch', camera_package, 'camera:=true', 'detector:=depth', 'session:=/a')
-    assert given_to_stand_ins(parameters)['align_depth'] == 'true'
-    assert parameters['/tracker_node/target_frame'] == 'camera_link'
-    assert parameters['/depth_detector_node/floor_frame'] == ''
-
-
-def test_one_command_starts_camera_and_pipeline_of_a_jackal(camera_package):
-    parameters = dumped('jackal.launch', camera_package, 'weights:=/some/yolov5n.pt', 'fps:=15', 'planner:=costmap',
-                        'frame_world:=odom', 'error_model:=/some/model.yaml')
-    given = given_to_stand_ins(parameters)
-    assert (given['align_depth'], given['color_fps'], given['respawn']) == ('true', '15', 'true')
-    assert parameters['/yolov5_node/weights'] == '/some/yolov5n.pt'
-    assert parameters['/tracker_node/target_frame'] == 'odom'
-    assert parameters['/planner_bridge_node/outputs'] == 'costmap'
-    assert parameters['/bbox3d_node/error_model'] == parameters['/tracker_node/error_model'] == '/some/model.yaml'
 
 
 @pytest.mark.parametrize('extras, arguments, expected', [
@@ -182,21 +187,3 @@ def test_camera_mount_is_published_unless_the_description_contains_it(monkeypatc
     monkeypatch.setenv('JACKAL_URDF_EXTRAS', extras)
     _parameters, nodes = loaded('jackal.launch', 'driver:=pyrealsense2', *arguments)
     assert (nodes['camera_mount'].args if 'camera_mount' in nodes else None) == expected
-
-
-@pytest.mark.parametrize('command, is_respawned', [
-    ('jackal.launch driver:=pyrealsense2 planner:=costmap', True),
-    ('jackal.launch driver:=pyrealsense2 planner:=costmap respawn:=false', False),
-    ('pipeline.launch planner:=costmap weights:=yolov5n.pt', False)])
-def test_nodes_are_respawned_on_the_robot_only(command, is_respawned):
-    """Elsewhere only with respawn:=true, because configuration errors would be logged repeatedly."""
-    _parameters, nodes = loaded(*command.split())
-    assert {node.respawn for node in nodes.values()} == {is_respawned}
-
-
-def test_computer_moves_the_pipeline_but_not_the_camera():
-    _parameters, nodes = loaded('jackal.launch', 'driver:=pyrealsense2', 'computer:=192.168.131.20',
-                                'planner:=costmap')
-    remote = set(name for name, node in nodes.items() if node.machine_name == 'people')
-    assert remote == {'people_node', 'planner_bridge_node'}
-    assert set(nodes) - remote == {'realsense_node', 'camera_mount'}
