@@ -72,8 +72,8 @@ class Play(object):
         self.rig = Rig(*sorted(self.cameras) if len(self.cameras) > 1 else [])
         self.transforms, self.counts = self.rig.transforms, self.rig.events.counts
 
-    def run(self, seconds, cameras=None, count=1, lags_ns=None):
-        """Let time pass. `lags_ns`: latency of the boxes of each camera."""
+    def run(self, seconds, cameras=None, count=1):
+        """Let time pass."""
         end_ns = self.now_ns + int(seconds * NS)
         cameras = self.cameras if cameras is None else cameras
         self._due_ns = {camera: max(due_ns, self.now_ns) for camera, due_ns in self._due_ns.items()}
@@ -83,7 +83,7 @@ class Play(object):
                 break
             self.now_ns = self._due_ns[camera]
             self._due_ns[camera] += self._periods_ns[camera]
-            self.send(camera, self.faults.get(camera, int)() - (lags_ns or {}).get(camera, 0), count)
+            self.send(camera, self.faults.get(camera, int)(), count)
         self.now_ns = end_ns
         return self
 

@@ -3,13 +3,8 @@ import pytest
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker, ThesisTrackerParams
-from ros_3d_bb.tracking.types import OCCLUDED, Detection
-
-SIZE = np.array([0.5, 0.5, 1.7])
-
-
-def at(x, y, z=0.9):
-    return Detection(np.array([x, y, z], float), SIZE)
+from ros_3d_bb.tracking.types import OCCLUDED
+from support.people import at
 
 
 def seconds(value):
@@ -42,7 +37,7 @@ def test_an_undetected_object_is_deleted_after_the_limit_in_seconds(rate_hz):
     tracker.update(0, [at(1, 2)])
     for frame in range(1, rate_hz + 1):
         track, = tracker.update(seconds(frame / rate_hz), [])
-        assert track.status == OCCLUDED and track.position_m.tolist() == [1, 2, 0.9] and track.last_seen_ns == 0
+        assert track.status == OCCLUDED and track.position_m.tolist() == [1, 2, 0.85] and track.last_seen_ns == 0
     assert tracker.update(seconds(1 + 1 / rate_hz), []) == []
 
 

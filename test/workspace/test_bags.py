@@ -18,6 +18,7 @@ from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_sessi
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images, scenario_to_bag
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
+from support.bags import messages_in
 
 
 @pytest.fixture(scope='module')
@@ -32,17 +33,11 @@ def messages(session, tmp_path_factory):
     """{topic: messages} of a bag at 10 Hz."""
     path = str(tmp_path_factory.mktemp('bag') / 'session.bag')
     assert write_bag(session_images(session, 10.0, with_boxes=True), path) == 7
-    return messages_in(path)
-
-
-def messages_in(path):
-    by_topic = {}
     with rosbag.Bag(path) as bag:
         for topic, message, time in bag.read_messages():
-            by_topic.setdefault(topic, []).append(message)
             stamped = message.transforms[0] if topic == '/tf' else message
             assert topic == '/yolo_bounding_box' or stamped.header.stamp == time
-    return by_topic
+    return messages_in(path)
 
 
 def test_pixels_boxes_and_intrinsics_are_those_of_the_session(session, messages):
