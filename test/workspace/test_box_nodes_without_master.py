@@ -3,7 +3,7 @@ import pytest
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray
 
-from fuzz.hostile import good_messages
+from fuzz.hostile import good_messages, transforms
 from fuzz.nodes import send_image
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_rgb
@@ -13,8 +13,10 @@ from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
+from ros_3d_bb.nodes.viewer_node import ViewerNode
 from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
+from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb.visualization.image_overlay import VALID_COLOR
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
@@ -80,7 +82,6 @@ def test_debug_images_are_published_while_they_have_subscribers(connections):
     assert connections.subscribers[COLOR_TOPIC].unregister.called
 
 
-STAMP_NS = 1000 * NS
 PEOPLE = [{'start': [4.0, 0.8], 'facing': 3.1, 'height': 1.8}, {'start': [5.0, -0.9], 'facing': 1.6, 'height': 1.7}]
 
 
@@ -91,7 +92,7 @@ def answer(frame_id='camera_color_optical_frame', changed=DepthPeopleParams(), *
     with masterless() as connections:
         node = DepthDetectorNode()
         node._reconfigure(DepthDetectorParams(), changed)
-        for topic, message in simulated_messages(simulator, frame, STAMP_NS):
+        for topic, message in simulated_messages(simulator, frame, START_NS):
             topic = '/tf' if topic == 'tf' else topic
             if topic != '/tf':
                 message.header.frame_id = frame_id
@@ -106,7 +107,7 @@ def test_people_are_detected_with_stamp_and_frame_of_the_image(frame_id):
     """Without a transform, the floor is fitted to the depth image."""
     message, drawn, counts, true_boxes = answer(frame_id)
     found = boxes2d_from_msg(message)
-    assert (found.stamp_ns, found.frame_id) == (STAMP_NS, frame_id) and drawn.header.stamp.to_nsec() == STAMP_NS
+    assert (found.stamp_ns, found.frame_id) == (START_NS, frame_id) and drawn.header.stamp.to_nsec() == START_NS
     assert len(found.boxes) == len(true_boxes)
     assert all(iou(np.array(box, float), found.boxes.astype(float)).max() > 0.5 for box in true_boxes)
     assert set(found.labels) == {'person'} and (found.scores > 0).all()
@@ -122,3 +123,18 @@ def test_nothing_is_published_while_no_floor_is_known():
     """Neither from tf nor from a depth image: an empty array would mean that there are no people."""
     message, _drawn, counts, _true_boxes = answer('unknown_to_tf', people=[], robot={'pitch': -0.9})
     assert message is None and counts['images without floor'] == 1
+
+
+def test_the_tilt_of_the_camera_is_stored_once_it_is_known(tmp_path):
+    """The person is estimated upright in the floor frame, as by bbox3d_node."""
+    with masterless({'window': False, 'session': str(tmp_path)}) as connections:
+        node = ViewerNode()
+        for number in range(2):
+            stamp_ns = START_NS + number * NS // 10
+            for topic, message in good_messages(stamp_ns).items():
+                if topic in connections.subscribers:
+                    connections.send(topic, message)
+            assert node.capture()[0]
+            connections.send('/tf', transforms(stamp_ns))
+    unknown, known = read_session(str(tmp_path)).frames
+    assert unknown.up is None and known.up.tolist() == [0, -1, 0]
