@@ -18,7 +18,7 @@ from ros_3d_bb.conversions.planner_msgs import points_to_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
 from support.masterless import on_the_wire
-from support.track_messages import person
+from support.ros import person
 
 FLOATS = (0.0, -0.0, 1.0, -1.0, 0.5, 3.0, float('nan'), float('inf'), -float('inf'), 1e308, -1e308, 5e-324, 1e-30, 1e6)
 INTEGERS = (0, 1, -1, 3, 7, 8, 10, 47, 48, 63, 64, 65, 255, 1000, 65535, 2 ** 31)  # and the limits of each type

@@ -20,8 +20,7 @@ from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
-from support.ros import Recorder, header_at, publisher, wait_until
-from support.track_messages import person
+from support.ros import Recorder, header_at, person, publisher, wait_until
 
 LATENCY_NS, TIMEOUT_S = NS // 10, 0.5
 COMMAND = Twist(linear=Vector3(x=1.2), angular=Vector3(z=0.6))

@@ -1,4 +1,4 @@
-"""Shared by the tests of nodes: recording topics, and messages of a camera."""
+"""Shared by the tests of nodes: recording topics, and messages of a camera and of a track."""
 import contextlib
 import signal
 import subprocess
@@ -11,7 +11,8 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
 from ros_3d_bb.conversions.image_msgs import fill_image
-from ros_3d_bb.conversions.perception_msgs import time_from
+from ros_3d_bb.conversions.perception_msgs import time_from, tracks_to_msg
+from support.tracks import track_at
 
 TIMEOUT_S = 20.0
 
@@ -102,6 +103,12 @@ def camera_info(stamp_ns, width=64, height=48, focal=60.0):
     info = CameraInfo(header=header_at(stamp_ns), width=width, height=height, distortion_model='plumb_bob', D=[0.0] * 5)
     info.K = [focal, 0, (width - 1) / 2.0, 0, focal, (height - 1) / 2.0, 0, 0, 1]
     return info
+
+
+def person(number, x, y, moving=True, speed=1.0):
+    """The message of a track that walks along x of the map, predicted for 2 s."""
+    track = track_at((x, y, 0.85), (speed, 0, 0), moving=moving, number=number)
+    return tracks_to_msg([track._replace(size_m=np.array([0.6, 0.6, 1.7]))], Header()).objects[0]
 
 
 def diagnostics_of(node, timeout_s=TIMEOUT_S):

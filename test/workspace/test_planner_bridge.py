@@ -16,7 +16,7 @@ from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeNode
 from support.masterless import masterless
 from support.planner_definitions import package
-from support.track_messages import person
+from support.ros import person
 
 START_NS = 1000 * NS
 PACKAGES = 'people_msgs', 'costmap_converter', 'derived_object_msgs', 'vision_msgs'

@@ -19,8 +19,7 @@ from ros_3d_bb.nodes.people_removal_node import PeopleRemovalNode
 from ros_3d_bb.nodes.speed_limit_node import SpeedLimitNode
 from support.compressed import compressed_fields
 from support.masterless import masterless, on_the_wire
-from support.ros import camera_info
-from support.track_messages import person
+from support.ros import camera_info, person
 from support.tracks import track_at
 
 STAMP_NS = 1000 * NS
