@@ -12,14 +12,9 @@ from ros_3d_bb.detection.yolov5.network import Bottleneck, C3, Concat, Conv, Det
 def write_checkpoint(path, layout, yaml=None, root='Model', anchor_grid=False):
     """Write a checkpoint of random float16 weights and return its network.
 
-    Parameters
-    ----------
-    yaml : dict, optional
-        The layout in the file, by default that of the weights.
-    root : str
-        Name of the model's class in `models.yolo`: Model (to release 6.1), DetectionModel (6.2 on), or another.
-    anchor_grid : bool
-        Whether the anchors are stored twice, as in release 5.0.
+    `yaml` is the layout in the file, by default that of the weights; `root` is the model's class in `models.yolo`:
+    Model (to release 6.1), DetectionModel (6.2 on), or another. With `anchor_grid`, the anchors are stored twice, as in
+    release 5.0.
     """
     network = random_network(layout).half()
     if anchor_grid:

@@ -1,7 +1,7 @@
 """Fenced blocks of code in Markdown pages."""
 import os
 import re
-from typing import NamedTuple
+from collections import namedtuple
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 # Pages with blocks that are run. Other pages of doc/ have none, or tests of their own.
@@ -11,13 +11,8 @@ PAGES = ('README.md',) + tuple('doc/%s.md' % name for name in (
     'rviz', 'security', 'simulation', 'topics', 'troubleshooting', 'tuning'))
 
 
-class Block(NamedTuple):
-    """Text between two fences; `language` is '' if the opening fence names none."""
-
-    page: str
-    line: int
-    language: str
-    text: str
+# Text between two fences; `language` is '' if the opening fence names none.
+Block = namedtuple('Block', 'page line language text')
 
 
 def blocks_in(page):

@@ -1,5 +1,5 @@
 """Tracking stages of cameras that look along x from one place, with boxes of a person 3 m ahead."""
-from typing import NamedTuple
+from collections import namedtuple
 
 import tf2_ros
 from geometry_msgs.msg import Point, Vector3
@@ -13,6 +13,7 @@ from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams, TrackingStage
 
 START_NS, PERIOD_NS = 1000 * NS, NS // 10
+Result = namedtuple('Result', 'tracks header')  # arguments of `on_tracks`
 PERIODS_NS = {'front': NS // 30, 'rear': NS // 25, 'left': NS // 10}  # of Play
 
 
@@ -27,13 +28,6 @@ class Transforms(object):
         if {source, stamp.to_nsec()} & self.missing:
             raise tf2_ros.LookupException('no such frame')
         return transform_from((0, 0, 1), OPTICAL_ROTATION)
-
-
-class Result(NamedTuple):
-    """Arguments of `on_tracks`."""
-
-    tracks: list
-    header: Header
 
 
 class Rig(TrackingStage):

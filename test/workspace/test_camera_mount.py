@@ -50,32 +50,27 @@ class RolledSimulator(Simulator):
         rolled[:3, :3] = [[np.cos(ROLL_RAD), -np.sin(ROLL_RAD), 0], [np.sin(ROLL_RAD), np.cos(ROLL_RAD), 0], [0, 0, 1]]
         return poses._replace(base_from_camera=poses.base_from_camera.dot(rolled))
 
-    def messages(self, frame):
-        """Stamp in nanoseconds of a frame, and its [(topic, message)]."""
+
+def images(frames, camera, turns, with_tf):
+    """The messages of each image of a camera that has to be turned to make its images upright."""
+    turned = np.eye(4)
+    turned[:3, :3] = turned_rotation(turns)
+    for frame in frames:
         stamp_ns = START_NS + int(frame.time_s * NS)
         header = Header(stamp=time_from(stamp_ns), frame_id=FRAME)
-        depth = DepthImage(frame.depth_mm, 0.001)
-        return stamp_ns, list(image_messages_of(CameraFrame(header, self.camera, frame.color, depth, ())))
+        color, depth_mm = (turned_image(image, -turns % 4) for image in (frame.color, frame.depth_mm))
+        taken = CameraFrame(header, turned_camera(camera, -turns % 4), color, DepthImage(depth_mm, 0.001),
+                            [('map', 'base_link', frame.poses.map_from_odom.dot(frame.poses.odom_from_base)),
+                             ('base_link', FRAME, frame.poses.base_from_camera.dot(turned))])
+        yield stamp_ns, list(messages_of(taken) if with_tf else image_messages_of(taken))
 
 
 @pytest.fixture(scope='module')
 def recorded():
-    """Returns the path of a bag of the scene, given the quarter turns that make its images upright."""
+    """Writes a bag of the scene, given the quarter turns that make its images upright."""
     simulator = Simulator(scenario_from(SCENE))
     frames = [simulator.frame(number) for number in range(simulator.frame_count)]
-
-    def images(turns, with_tf):
-        rolled = np.eye(4)
-        rolled[:3, :3] = turned_rotation(turns)
-        for frame in frames:
-            stamp_ns = START_NS + int(frame.time_s * NS)
-            header = Header(stamp=time_from(stamp_ns), frame_id=FRAME)
-            color, depth_mm = (turned_image(image, -turns % 4) for image in (frame.color, frame.depth_mm))
-            taken = CameraFrame(header, turned_camera(simulator.camera, -turns % 4), color, DepthImage(depth_mm, 0.001),
-                                [('map', 'base_link', frame.poses.map_from_odom.dot(frame.poses.odom_from_base)),
-                                 ('base_link', FRAME, frame.poses.base_from_camera.dot(rolled))])
-            yield stamp_ns, list(messages_of(taken) if with_tf else image_messages_of(taken))
-    return lambda path, turns=0, with_tf=True: write_bag(images(turns, with_tf), str(path))
+    return lambda path, turns=0, with_tf=True: write_bag(images(frames, simulator.camera, turns, with_tf), str(path))
 
 
 def processed(folder, *options):
@@ -97,7 +92,7 @@ def rolled(tmp_path_factory):
     """Folder with a bag of a RolledSimulator, and the true positions (n, 2) of the people in its last image."""
     simulator, folder = RolledSimulator(), tmp_path_factory.mktemp('rolled')
     frames = [simulator.frame(number) for number in range(simulator.frame_count)]
-    write_bag(map(simulator.messages, frames), str(folder / 'in.bag'))
+    write_bag(images(frames, simulator.camera, 0, with_tf=False), str(folder / 'in.bag'))
     return folder, np.array([person.position_m[:2] for person in frames[-1].people])
 
 

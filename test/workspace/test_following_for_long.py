@@ -1,7 +1,7 @@
 """Ten minutes of following a person past people who cross, in the simulator: the same result on any machine."""
 import functools
 import os
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 import pytest
@@ -25,12 +25,8 @@ from support.pages import ROOT
 LATENCY_S, PERIOD_S = 0.12, 0.05
 
 
-class Moment(NamedTuple):
-    """What is followed in one image: the person (number from 1, 0 without one), and the distance from person 1."""
-
-    time_s: float
-    person: int
-    distance_m: float
+# What is followed in one image: the person (number from 1, 0 without one), and the distance from person 1.
+Moment = namedtuple('Moment', 'time_s person distance_m')
 
 
 class FollowedScene(object):
