@@ -22,9 +22,9 @@ UPPER_SHARE, LOWER_WEIGHT = 0.55, 0.35
 NEAREST_LAYER_M = 0.001  # nearer distances are 0 in whole millimetres
 UNKNOWN_MM, FARTHEST_LAYER_M = 65535, 65.0  # chosen: 16 bits hold the farthest layer and half a body behind it
 # An object of at least this share of its usual height reaches into the upper part of its rectangle, this share of the
-# rows: it has more than so many samples there. The object that it hides a part of is farther by at least this
-# distance. Chosen: a hidden chair appears to have 0.6 of its size, rectangles of detectors are hardly larger at the top, and a box
-# that a person carries is nearer than the trunk by more.
+# rows: it has more than so many samples there. The object that it hides a part of is farther by at least this distance.
+# Chosen: a hidden chair appears to have 0.6 of its size, rectangles of detectors are hardly larger at the top, and what
+# a person carries is nearer than the trunk by more.
 LEAST_SIZE, UPPER_PART, MOST_ABOVE, LEAST_BEHIND_MM = 0.65, 0.15, 4, 200
 # Half the depth extents of a person with stretched arms, and of the trunk. Chosen: points farther from the trunk are
 # not part of the person, and a wall close behind must not shift the median.
