@@ -22,6 +22,7 @@ FEW = 0.2  # share of the samples from which on a layer has more than `LEAST_SHA
 LEAST_SUPPORT = 0.1  # minimum share of the samples with depth in the layer for an estimate; chosen
 TALL_M, ARMS_ABOVE_M = 1.8, 0.04  # chosen: people who appear taller may raise their arms so far above their heads
 LEAST_WIDTH_M = 0.05  # chosen: of a body that is one pixel wide
+BENT_M = 0.15  # chosen: what the ends of people who walk are nearer or farther than their layer
 
 
 def estimate_foreground(depth, rects_px, geometry, kinds):
@@ -33,7 +34,7 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     fills the outline of the rectangle, too, as furniture and other people at the sides do. Flying pixels are too sparse
     to form a layer. The position is that of the vertical axis of the object: laterally halfway between the edges of the
     layer, for people near the middle of the trunk, and behind its mean depth by the distance of its class. The ends of
-    the object are at their own distances: the head of a person who bends is nearer than the feet, or farther. The
+    a person who bends are at their own distances: the head is nearer than the feet, or farther. The
     height of people does not include raised arms. If the image border truncates the object, it is completed to the
     usual size of its class. All of this is done in the level frame.
 
@@ -125,9 +126,11 @@ def _visible_extents(samples, flat_px, geometry, may_repeat):
     # The mean without the nearest and the farthest tenth is finer than the median, which has the depth resolution.
     layer_m = layer.mean_mm(layer.first + count // 10, layer.end - count // 10) / 1000
     upper, lower = slopes_down(flat_px, geometry)
-    upper_m, lower_m = samples.ends(on_body)
-    top_m, bottom_m = upper_m * upper, lower_m * lower
     looks_down = geometry.level_axes[1][2] > LOOKS_DOWN
+    # Before a level camera, the distances of the ends hardly matter unless the person bends; the mean is less noisy.
+    upper_m, lower_m = [end_m if looks_down or abs(end_m - layer_m) > BENT_M else layer_m
+                        for end_m in samples.ends(on_body)]
+    top_m, bottom_m = upper_m * upper, lower_m * lower
     left_m, right_m, trunk_m = samples.edges(on_body, bottom_m - FEET_M if looks_down else None)
     if bottom_m - top_m > TALL_M:
         left_px, top_px, right_px, bottom_px = flat_px
