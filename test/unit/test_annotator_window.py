@@ -148,7 +148,7 @@ def message_of(box):
     return box.text() + box.informativeText()
 
 
-def test_typed_text_stays_until_it_is_entered_or_another_measurement_is_shown(drive):
+def test_typed_text_stays_until_entered_or_another_measurement_is_shown(drive):
     fields = drive.window.pane.truth.fields
     drive.press('-500', Qt.Key_Tab, '2100', (Qt.Key_2, ALT), (Qt.Key_1, ALT))
     assert [fields[name].text() for name in 'xz'] == ['-500', '2100']

@@ -118,7 +118,7 @@ def test_a_second_box_of_a_person_is_no_person_on_the_wall(height_m, ahead_m, wi
     assert found and all(abs(box.center_m[2] - depths_m(simulator)[0]) < 0.3 for box in found)
 
 
-def test_a_second_box_of_a_person_of_whom_another_one_hides_a_side_is_no_person_on_the_wall():
+def test_a_second_box_of_a_partly_hidden_person_is_no_person_on_the_wall():
     simulator = simulator_of([{'start': [3.3, -0.62], 'facing': 3.1, 'height': 1.7},
                               {'start': [5.15, -0.42], 'facing': 3.1, 'height': 1.8}], 0.9, wall_m=9.0)
     near_px, far_px = [tuple(person.box_px) for person in simulator.frame(0).people]

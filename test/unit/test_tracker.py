@@ -102,7 +102,7 @@ def test_boxes_with_the_depth_of_the_background_do_not_move_the_track():
 
 
 @pytest.mark.parametrize('behind_m', [0.4, 0.6])
-def test_a_new_person_keeps_the_id_after_several_boxes_with_the_depth_of_the_background(behind_m):
+def test_a_new_person_keeps_the_id_after_boxes_of_background_depth(behind_m):
     """They move the track, whose velocity is unknown, so that the next box is nearer than its gate."""
     walk = play(Tracker(), 1, lambda time_s: [at(3 + behind_m * (3 <= round(30 * time_s) < 10), 0)])
     assert {track_id for objects in walk for track_id in ids(objects)} == {1}

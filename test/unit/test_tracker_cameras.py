@@ -277,7 +277,7 @@ def test_cameras_whose_poses_disagree_do_not_move_the_frame(rate_hz, offset_m):
 
 
 @pytest.mark.parametrize('rate_hz, nearer_m', [(15, 0.13), (30, 0.18)])
-def test_a_person_whom_opposite_cameras_measure_too_near_stands(rate_hz, nearer_m):
+def test_a_person_measured_too_near_by_opposite_cameras_stands(rate_hz, nearer_m):
     """Each box is before the track, but no outliers have moved it."""
     opposite, random = looking(np.pi, 'opposite'), np.random.RandomState(0)
     opposite.fixed_from_camera[0, 3] = 8.0

@@ -26,6 +26,7 @@ UNKNOWN_MM, FARTHEST_LAYER_M = 65535, 65.0  # chosen: 16 bits hold the farthest 
 # Chosen: a hidden chair appears to have 0.6 of its size, rectangles of detectors are hardly larger at the top, and what
 # a person carries is nearer than the trunk by more.
 LEAST_SIZE, UPPER_PART, MOST_ABOVE, LEAST_BEHIND_MM = 0.65, 0.15, 4, 200
+LEFT_OUT_PERCENT = 10  # of the samples at both ends of such an object; chosen: a foot may be as near as what is carried
 # Half the depth extents of a person with stretched arms, and of the trunk. Chosen: points farther from the trunk are
 # not part of the person, and a wall close behind must not shift the median.
 BODY_HALF_DEPTH_MM, TRUNK_HALF_DEPTH_MM = 350, 250
@@ -124,9 +125,9 @@ class RectSamples(object):
         above = int(numbers[min(MOST_ABOVE, len(numbers) - 1)]) // columns
         if above < UPPER_PART * rows:
             return None
-        left_out = len(numbers) // 10  # a foot may be as near as what a person carries
+        left_out = len(numbers) * LEFT_OUT_PERCENT // 100
         top_m, bottom_m = self._along(1)[numbers[[left_out, -1 - left_out]]]
-        if bottom_m - top_m > 0.8 * self._least_m:
+        if bottom_m - top_m > (100 - 2 * LEFT_OUT_PERCENT) / 100 * self._least_m:
             return None
         end = above * columns
         above_mm, weights = ahead_mm[:end], self._weights[:end]

@@ -22,7 +22,7 @@ FEW = 0.2  # share of the samples from which on a layer has more than `LEAST_SHA
 LEAST_SUPPORT = 0.1  # minimum share of the samples with depth in the layer for an estimate; chosen
 TALL_M, ARMS_ABOVE_M = 1.8, 0.04  # chosen: people who appear taller may raise their arms so far above their heads
 LEAST_WIDTH_M = 0.05  # chosen: of a body that is one pixel wide
-BENT_M = 0.15  # chosen: what the ends of people who walk are nearer or farther than their layer
+BENT_M = 0.15  # chosen: before a level camera, the ends of people who walk are at most this far from their layer
 
 
 def estimate_foreground(depth, rects_px, geometry, kinds):
@@ -34,9 +34,9 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     fills the outline of the rectangle, too, as furniture and other people at the sides do. Flying pixels are too sparse
     to form a layer. The position is that of the vertical axis of the object: laterally halfway between the edges of the
     layer, for people near the middle of the trunk, and behind its mean depth by the distance of its class. The ends of
-    a person who bends are at their own distances: the head is nearer than the feet, or farther. The
-    height of people does not include raised arms. If the image border truncates the object, it is completed to the
-    usual size of its class. All of this is done in the level frame.
+    a person who bends are at their own distances: the head is nearer than the feet, or farther. The height of people
+    does not include raised arms. If the image border truncates the object, it is completed to the usual size of its
+    class. All of this is done in the level frame.
 
     In the rectangles of nearer objects with plausible boxes, pixels that are not behind them are masked. Rectangles are
     therefore estimated in groups, each after those in front of it. Of several rectangles of one object, only the
