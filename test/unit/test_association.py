@@ -51,10 +51,10 @@ def test_the_first_look_leaves_out_no_allowed_pair(seed):
 @given(SEEDS)
 def test_crowds_have_the_same_costs(seed):
     given_scene = scene(seed)
-    few, few_misplaced = allowed_costs(*given_scene)
+    few, few_nearer = allowed_costs(*given_scene)
     with mock.patch.object(association, 'CROWD', 1):
-        crowd, misplaced = allowed_costs(*given_scene)
-    assert set(few) == set(crowd) and few_misplaced == misplaced
+        crowd, nearer = allowed_costs(*given_scene)
+    assert set(few) == set(crowd) and few_nearer == nearer
     assert [crowd[pair] for pair in few] == pytest.approx(list(few.values()))
 
 

@@ -109,6 +109,22 @@ def test_a_new_person_keeps_the_id_after_boxes_of_background_depth(behind_m):
     assert max(abs(objects[0].position_m[0] - 3) for objects in walk[14:]) < 0.2
 
 
+@pytest.mark.parametrize('rate_hz', [7.5, 15, 30, 60])
+def test_boxes_of_something_nearer_do_not_move_a_person_who_stands(rate_hz):
+    """One box in seven is 0.45 m too near, as of a hand. Before, the speed was up to 2 m/s."""
+    walk = play(Tracker(), 6, lambda time_s: [at(3 - 0.45 * (round(rate_hz * time_s) % 7 == 6), 0)], rate_hz)
+    assert {track_id for objects in walk for track_id in ids(objects)} == {1}
+    for track, in walk[int(2 * rate_hz):]:
+        assert abs(track.position_m[0] - 3) < 0.1 and np.linalg.norm(track.velocity_mps) < 0.1
+
+
+def test_a_person_whom_boxes_of_background_depth_have_moved_for_long_is_moved_back():
+    """They last for 3 s."""
+    walk = play(Tracker(), 5, lambda time_s: [at(3 + 0.45 * (time_s < 3), 0)])
+    assert {track_id for objects in walk for track_id in ids(objects)} == {1}
+    assert max(abs(objects[0].position_m[0] - 3) for objects in walk[105:]) < 0.1
+
+
 def test_a_truncated_box_shows_only_one_side_of_a_person():
     """The centre of the visible half of a body is 0.125 m from that of the person."""
     track, = play(Tracker(), 1, lambda _time_s: [at(3, 1.5, cut='left', width=0.25)])[-1]

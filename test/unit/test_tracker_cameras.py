@@ -276,13 +276,14 @@ def test_cameras_whose_poses_disagree_do_not_move_the_frame(rate_hz, offset_m):
     assert max(steps_m(published)) < 0.4 * np.linalg.norm(offset_m)
 
 
-@pytest.mark.parametrize('rate_hz, nearer_m', [(15, 0.13), (30, 0.18)])
+@pytest.mark.parametrize('rate_hz, nearer_m', [(5, 0.15), (7.5, 0.18), (15, 0.13), (30, 0.18)])
 def test_a_person_measured_too_near_by_opposite_cameras_stands(rate_hz, nearer_m):
     """Each box is before the track, but no outliers have moved it."""
     opposite, random = looking(np.pi, 'opposite'), np.random.RandomState(0)
     opposite.fixed_from_camera[0, 3] = 8.0
     published = play(Tracker(), [
-        (START_NS + number * NS // (2 * rate_hz), [at(*random.normal((4 + (2 * (number % 2) - 1) * nearer_m, 0), 0.02),
-                                                      sigma=0.02)], (FRONT, opposite)[number % 2])
-        for number in range(20 * rate_hz)])[4 * rate_hz:]
+        (START_NS + int(number * NS / (2 * rate_hz)),
+         [at(*random.normal((4 + (2 * (number % 2) - 1) * nearer_m, 0), 0.02), sigma=0.02)],
+         (FRONT, opposite)[number % 2]) for number in range(int(20 * rate_hz))])[int(4 * rate_hz):]
     assert max(np.linalg.norm(track.velocity_mps) for objects in published for track in objects) < 0.3
+    assert all(ids(objects) == [1] for objects in published)

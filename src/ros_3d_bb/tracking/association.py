@@ -5,7 +5,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.kalman_filter import as_outlier, moved_back, weighted
+from ros_3d_bb.tracking.kalman_filter import as_outlier, weighted
 
 RECENT_NS = 6 * NS // 10  # tracks matched less than this ago are associated before the others; chosen
 UNSURE_SHARE = 0.1  # upper bound of the new-target density, relative to the peak density of the detection; chosen
@@ -21,10 +21,10 @@ def associate(tracks, measurements, stamp_ns, params, outliers):
     A pair is allowed only if the track explains the measurement better than a new target does (the gate), and both
     have the same group of classes. Of the allowed pairs, those are selected that explain all measurements best, with a
     new target where no pair is left. `params` are `tracker.TrackerParams`, `outliers` their OutlierModel. Returns a
-    list of (Track, Measurement). Tracks that outliers have moved behind their objects are moved back, in place.
+    list of (Track, Measurement).
     """
     matches, ranks, taken = [], {}, set()
-    costs, misplaced = allowed_costs(tracks, measurements, params, outliers)
+    costs, nearer = allowed_costs(tracks, measurements, params, outliers)
     for pair, cost in costs.items():
         track = tracks[pair[0]]
         rank = int(stamp_ns - track.last_ns >= RECENT_NS) if track.is_confirmed else 2
@@ -33,9 +33,7 @@ def associate(tracks, measurements, stamp_ns, params, outliers):
         costs = {pair: cost for pair, cost in ranks[rank].items() if pair[1] not in taken} if taken else ranks[rank]
         for row, column in costs if len(costs) == 1 else _assigned(costs):
             track, measurement = tracks[row], measurements[column]
-            if (row, column) in misplaced:
-                track.state = moved_back(track.state, measurement.ray_x, measurement.ray_y, outliers)
-            matches.append((track, measurement))
+            matches.append((track, measurement._replace(is_nearer=True) if (row, column) in nearer else measurement))
             taken.add(column)
     return matches
 
@@ -43,20 +41,20 @@ def associate(tracks, measurements, stamp_ns, params, outliers):
 def allowed_costs(tracks, measurements, params, outliers):
     """The costs {(number of the track, number of the measurement): cost} of the allowed pairs, less that of a new
     target: -log of the density of the measurement given the track, per m², and the cost of their heights; and the set
-    of the pairs that fit better if outliers have moved the track.
+    of the pairs that fit better if the measurement is nearer than the track by the offset of outliers.
     """
     gates = [_gate(measurement, params.new_target_density, outliers) for measurement in measurements]
     is_crowd = len(tracks) * len(measurements) >= CROWD
     pairs = (_likely_pairs_of_crowd if is_crowd else _likely_pairs)(tracks, measurements, gates, outliers)
-    costs, misplaced = {}, set()
-    for row, column, cost, is_misplaced in pairs:
+    costs, nearer = {}, set()
+    for row, column, cost, is_nearer in pairs:
         track, measurement = tracks[row], measurements[column]
         cost += height_cost(track, measurement, params.height_sigma)
         if cost < gates[column][0] and track.kind.group == measurement.kind.group:
             costs[row, column] = cost - gates[column][0]
-            if is_misplaced:
-                misplaced.add((row, column))
-    return costs, misplaced
+            if is_nearer:
+                nearer.add((row, column))
+    return costs, nearer
 
 
 def _gate(measurement, new_target_density, outliers):
@@ -92,14 +90,15 @@ def position_costs(x, y, xx, xy, yy, ray_x, ray_y, outliers):
                                      weighted(*outlier, log_share=outliers.log_outliers, log=np.log)[0])
 
 
-def misplaced_cost(x, y, xx, xy, yy, ray_x, ray_y, outliers, log=math.log):
-    """As `position_cost`, if outliers have moved the track behind its object. With `log` = numpy.log, of arrays."""
-    nearer = as_outlier(x, y, xx, xy, yy, -ray_x, -ray_y, outliers)  # the box is before the track
-    return LOG_TWO_PI - weighted(*nearer, log_share=outliers.log_misplaced, log=log)[0]
+def nearer_cost(x, y, xx, xy, yy, ray_x, ray_y, outliers, log=math.log):
+    """As `position_cost`, of a box that is nearer than the track by the offset of outliers. With `log` = numpy.log, of
+    arrays."""
+    nearer = as_outlier(x, y, xx, xy, yy, -ray_x, -ray_y, outliers)
+    return LOG_TWO_PI - weighted(*nearer, log_share=outliers.log_nearer, log=log)[0]
 
 
 def _likely_pairs(tracks, measurements, gates, outliers):
-    """The pairs (row, column, position cost, whether outliers have moved the track) with costs below those of new
+    """The pairs (row, column, position cost, whether the measurement is nearer) with costs below those of new
     targets.
     """
     pairs = []
@@ -112,16 +111,16 @@ def _likely_pairs(tracks, measurements, gates, outliers):
                 innovation = (to_x, to_y, xx + measurement.xx, xy + measurement.xy, yy + measurement.yy,
                               measurement.ray_x, measurement.ray_y, outliers)
                 cost = position_cost(*innovation)
-                nearer_cost = misplaced_cost(*innovation) if track.may_be_misplaced else math.inf
-                if min(cost, nearer_cost) < limit:
-                    pairs.append((row, column, min(cost, nearer_cost), nearer_cost < cost))
+                before_cost = nearer_cost(*innovation) if not track.unseen_s else math.inf
+                if min(cost, before_cost) < limit:
+                    pairs.append((row, column, min(cost, before_cost), before_cost < cost))
     return pairs
 
 
 def _likely_pairs_of_crowd(tracks, measurements, gates, outliers):
     """As `_likely_pairs`, by arrays."""
     x, y, xx, xy, yy = np.array([track.state for track in tracks]).T[[0, 1, 4, 5, 8]]
-    may_be_misplaced = np.array([track.may_be_misplaced for track in tracks])
+    is_recent = np.array([not track.unseen_s for track in tracks])
     to_x, to_y, noise_xx, noise_xy, noise_yy, ray_x, ray_y, limits, factors, reaches = np.array([
         (measurement.x, measurement.y, measurement.xx, measurement.xy, measurement.yy, measurement.ray_x,
          measurement.ray_y) + gate for measurement, gate in zip(measurements, gates)]).T
@@ -130,10 +129,10 @@ def _likely_pairs_of_crowd(tracks, measurements, gates, outliers):
     innovations = (to_x[columns] - x[rows], to_y[columns] - y[rows], xx[rows] + noise_xx[columns],
                    xy[rows] + noise_xy[columns], yy[rows] + noise_yy[columns], ray_x[columns], ray_y[columns], outliers)
     costs = position_costs(*innovations)
-    nearer_costs = np.where(may_be_misplaced[rows], misplaced_cost(*innovations, log=np.log), np.inf)
-    least = np.minimum(costs, nearer_costs)
+    before_costs = np.where(is_recent[rows], nearer_cost(*innovations, log=np.log), np.inf)
+    least = np.minimum(costs, before_costs)
     is_likely = least < limits[columns]
-    return zip(*(values[is_likely].tolist() for values in (rows, columns, least, nearer_costs < costs)))
+    return zip(*(values[is_likely].tolist() for values in (rows, columns, least, before_costs < costs)))
 
 
 def height_cost(track, measurement, sigma_m):

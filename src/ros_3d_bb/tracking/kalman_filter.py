@@ -2,15 +2,16 @@
 
 Convention: lengths are in metres, times in seconds, in the fixed frame. If the depth of a box is that of the
 background, the measurement lies behind the person on the viewing ray. The measurement error is therefore a mixture of
-two Gaussians, one of them shifted along the ray. Several outliers in succession move the track behind the person, too:
-of a track that was detected in the previous image, a second hypothesis is that it is nearer by this shift.
+two Gaussians, one of them shifted along the ray. Several outliers in succession move the track behind the person, too.
+A box that is nearer than the track by this shift therefore has two explanations, between which the track decides: the
+track is misplaced, or the box is.
 
 The algebra of 2x2 and 4x4 matrices is written out, because numpy takes several times as long for a few numbers.
 """
 import math
 from typing import NamedTuple
 
-MISPLACED = 0.5  # share of tracks that outliers have moved, relative to that of outliers; chosen
+NEARER = 0.5  # share of boxes that are nearer by the offset of outliers, relative to that of outliers; chosen
 LEAST_SHARE = 1e-12  # lower bound of the share of a component of the mixture, for its logarithm
 LARGEST_EXPONENT = 700.0  # of math.exp
 
@@ -27,19 +28,19 @@ class State(NamedTuple('State', [(name, float) for name in 'x y u v xx xy xu xv 
 
 
 class OutlierModel(NamedTuple):
-    """Logarithms of the shares of inliers, of outliers, and of tracks that outliers have moved; mean and variance of
-    the shift of outliers along the ray."""
+    """Logarithms of the shares of inliers, of outliers, and of boxes that are nearer by their offset; mean and variance
+    of this offset along the ray."""
 
     log_inliers: float
     log_outliers: float
-    log_misplaced: float
+    log_nearer: float
     offset_m: float
     spread_m2: float
 
 
 def outlier_model(params):
     """The OutlierModel of `tracker.TrackerParams`."""
-    shares = 1 - params.outlier_share, params.outlier_share, MISPLACED * params.outlier_share
+    shares = 1 - params.outlier_share, params.outlier_share, NEARER * params.outlier_share
     log_shares = [math.log(max(share, LEAST_SHARE)) for share in shares]
     return OutlierModel(*log_shares, offset_m=params.outlier_offset, spread_m2=params.outlier_spread ** 2)
 
@@ -111,7 +112,7 @@ def update(state, measurement, outliers):
                  uu - u_x * xu - u_y * yu, uv - u_x * xv - u_y * yv, vv - v_x * xv - v_y * yv)
 
 
-def moved_back(state, ray_x, ray_y, outliers):
-    """The State of an object behind which outliers have moved its track, given the viewing direction."""
-    x, y, xx, xy, yy = as_outlier(state.x, state.y, state.xx, state.xy, state.yy, ray_x, ray_y, outliers)
-    return state._replace(x=x, y=y, xx=xx, xy=xy, yy=yy)
+def moved_back(place, ray_x, ray_y, outliers):
+    """A State or Measurement, moved against the direction (ray_x, ray_y) by the offset of outliers."""
+    x, y, xx, xy, yy = as_outlier(place.x, place.y, place.xx, place.xy, place.yy, ray_x, ray_y, outliers)
+    return place._replace(x=x, y=y, xx=xx, xy=xy, yy=yy)

@@ -35,16 +35,17 @@ def match_manoeuvres(tracks, measurements, matches, latest_ns, stamp_ns, height_
     """
     earliest_ns = max(min(latest_ns, stamp_ns - RECENT_NS), stamp_ns - LONGEST_NS)
     seen = [track for track in tracks if earliest_ns <= track.last_ns < stamp_ns]
-    matched = set(id(part) for match in matches for part in match)
+    matched = set(track.id for track, _measurement in matches)
+    taken = set(measurement.number for _track, measurement in matches)
 
     def is_within_reach(track, measurement):
         return _is_within_reach(track, measurement, stamp_ns, track.last_ns >= latest_ns, height_sigma_m)
 
     pairs = []
     for track in seen:
-        if id(track) not in matched:
+        if track.id not in matched:
             near = [measurement for measurement in measurements if is_within_reach(track, measurement)]
-            if len(near) == 1 and id(near[0]) not in matched and not any(
+            if len(near) == 1 and near[0].number not in taken and not any(
                     is_within_reach(other, near[0]) for other in seen if other is not track):
                 pairs.append((track, near[0]))
     for track, measurement in pairs:

@@ -84,7 +84,7 @@ class Measurement(NamedTuple):
 
     Centre; covariance (xx, xy, yy) in the plane and variance of the height; whether the covariance is assumed; extents;
     distance from the camera and unit vector from the camera in the plane; Kind; the Detection, and its number in the
-    image.
+    image; whether it is nearer than its track by the offset of outliers.
     """
 
     x: float
@@ -102,6 +102,7 @@ class Measurement(NamedTuple):
     kind: Kind
     detection: Detection
     number: int
+    is_nearer: bool = False
 
 
 def correlated_images(elapsed_s, detector, acceleration):
@@ -203,7 +204,7 @@ def learned_log_scale(log_scale, matches):
     """
     scale, total = math.exp(min(log_scale, 0)), 0.0
     for track, measurement in matches:
-        if measurement.is_assumed and track.hits >= SETTLED_HITS:
+        if measurement.is_assumed and track.hits >= SETTLED_HITS and not measurement.is_nearer:
             (before_x, before_y), state = track.innovation_m, track.state
             product = before_x * (measurement.x - state.x) + before_y * (measurement.y - state.y)
             expected = state.xx + state.yy + scale * (measurement.xx + measurement.yy)

@@ -20,6 +20,8 @@ from ros_3d_bb.tracking.types import (NOT_DETECTED, OUT_OF_VIEW, PREDICTION_STEP
 
 # All are chosen; `./run bench tracking` and `./run bench scenes` show the effect of others.
 HIT_CORRELATION_S = 0.08  # without scores, three images at 30 Hz or two independent ones confirm a track by default
+OUTLIER_CORRELATION_S = 0.2  # boxes of the same kind, such as outliers, follow each other; chosen
+LEAST_MISPLACED = -5.0  # of the log odds that outliers have moved a track: earlier boxes are forgotten; chosen
 MISS_CORRELATION_S = 0.15  # the causes of misses, such as poses and partial occlusion, last longer
 UNKNOWN_SCORE, LARGEST_SCORE = 0.5, 0.9999  # assumed if the score is unknown; upper bound, for its log odds
 # Of the score of a detection. A high score does not mean that the position is right, as of a person half hidden.
@@ -101,16 +103,18 @@ class _End(NamedTuple):
 
 
 class LatestBox(NamedTuple):
-    """Position of the latest detection, and the height of its upper end, or of the image border that truncates it."""
+    """Position of the latest detection, and the height of its upper end, or of the image border that truncates it;
+    whether it was nearer than the track by the offset of outliers."""
 
     x: float
     y: float
     head_m: float
+    is_nearer: bool
 
     @classmethod
     def of(cls, measurement):
         """The LatestBox of a Measurement."""
-        return cls(measurement.x, measurement.y, measurement.z + measurement.size_m[2] / 2)
+        return cls(measurement.x, measurement.y, measurement.z + measurement.size_m[2] / 2, measurement.is_nearer)
 
 
 class Track(object):
@@ -124,7 +128,7 @@ class Track(object):
     detection was expected. `log_odds` is the track score. `kind` is the class of the group that has the most of the
     filtered scores `votes`; `score` is the filtered score of the detections, `detection` the `Detection.index` in the
     latest image. `innovation_m` is that of the latest image if its noise is assumed, otherwise 0. `slow_mps` is the
-    velocity, filtered over `SLOW_S`.
+    velocity, filtered over `SLOW_S`. `misplaced` are the log odds that outliers have moved this track.
     """
 
     def __init__(self, track_id, measurement, stamp_ns, camera, speed_mps, even_log_odds):
@@ -139,15 +143,9 @@ class Track(object):
         self.latest, self.misses = LatestBox.of(measurement), 0
         self.hits, self.first_ns, self.last_ns, self.unseen_s, self.missed_s = 1, stamp_ns, stamp_ns, 0.0, 0.0
         self.status, self.visibility, self.innovation_m = VISIBLE, {camera: SEEN}, (0.0, 0.0)
-        self.slow_mps = 0.0, 0.0
+        self.slow_mps, self.misplaced = (0.0, 0.0), 0.0
         self.log_odds, self.is_confirmed, self.is_moving = log_odds_of(detection.score, even_log_odds), False, False
         self.votes = {measurement.kind.label: _vote(detection.score)}
-
-    @property
-    def may_be_misplaced(self):
-        """Whether outliers may have moved this track: it was detected in the latest image, and is in view of one
-        camera only. The boxes of several cameras also differ where their poses are wrong."""
-        return not self.unseen_s and sum(seen != OUT_OF_VIEW for seen in self.visibility.values()) == 1
 
     def predicted(self, elapsed_s, acceleration):
         """A copy of this track `elapsed_s` later, not detected, given the acceleration density of people."""
@@ -166,13 +164,14 @@ class Track(object):
     def update(self, measurement, stamp_ns, camera, rules):
         """Update this track, predicted to the stamp, with its measurement in the image of a camera."""
         self.set_visibility(camera, SEEN)
+        elapsed_s = (stamp_ns - self.last_ns) / NS
+        period_s, share = elapsed_s - self.unseen_s, max(1 - math.exp(-elapsed_s / SLOW_S), 1 / self.hits)
+        latest, self.latest = self.latest, LatestBox.of(measurement)
+        measurement = self._in_place(measurement, latest, period_s, rules.outliers)
         detection, state = measurement.detection, self.state
         is_assumed = measurement.is_assumed
         self.innovation_m = (measurement.x - state.x, measurement.y - state.y) if is_assumed else (0.0, 0.0)
-        self.latest = LatestBox.of(measurement)
         self.state = state = kalman_filter.update(state, measurement, rules.outliers)
-        elapsed_s = (stamp_ns - self.last_ns) / NS
-        period_s, share = elapsed_s - self.unseen_s, max(1 - math.exp(-elapsed_s / SLOW_S), 1 / self.hits)
         slow_u, slow_v = self.slow_mps
         self.slow_mps = slow_u + share * (state.u - slow_u), slow_v + share * (state.v - slow_v)
         log_odds = log_odds_of(detection.score, rules.even_log_odds)
@@ -186,6 +185,26 @@ class Track(object):
         self.is_moving = math.hypot(state.u, state.v) >= limit_mps
         self._update_size(measurement, stamp_ns)
         self._update_class(measurement.kind, detection.score, rules.kinds)
+
+    def _in_place(self, measurement, latest, period_s, outliers):
+        """The measurement, or if it is nearer than this track by the offset of outliers, and boxes at the track were
+        more likely than outliers, the measurement moved to the track; otherwise the track is moved to it.
+
+        `misplaced` is filtered by the likelihood ratio of the boxes. It counts fully if the box is not as the `latest`
+        one, and otherwise by the time since then: errors of boxes last.
+        """
+        is_nearer = measurement.is_nearer
+        share = min(period_s / OUTLIER_CORRELATION_S, 1) if is_nearer == latest.is_nearer else 1
+        if not is_nearer:
+            self.misplaced = max(self.misplaced + share * (outliers.log_outliers - outliers.log_inliers),
+                                 LEAST_MISPLACED)
+            return measurement
+        self.misplaced += share * (outliers.log_inliers - outliers.log_nearer)
+        if self.misplaced < 0 or sum(seen != OUT_OF_VIEW for seen in self.visibility.values()) > 1:
+            return kalman_filter.moved_back(measurement, -measurement.ray_x, -measurement.ray_y, outliers)
+        self.state = kalman_filter.moved_back(self.state, measurement.ray_x, measurement.ray_y, outliers)
+        self.misplaced, self.latest = LEAST_MISPLACED, self.latest._replace(is_nearer=False)
+        return measurement
 
     def miss(self, status, unseen_s, missed_s, detection_probability):
         """Mark this track as not detected for `unseen_s` and not detected where a camera should for `missed_s`."""
