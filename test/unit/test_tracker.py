@@ -80,6 +80,17 @@ def test_two_tracks_that_meet_in_one_person_become_one():
     assert ids(published[10]) == [1, 2] and ids(published[-1]) == [1]
 
 
+def test_a_person_whose_legs_are_hidden_keeps_the_id():
+    """A person starts to walk behind a trolley, is missed for 0.4 s, and then only visible above it."""
+    def walking(time_s):
+        y = 0.5 * max(time_s - 1, 0)
+        upper = at(3, y, height=1.05, position_m=np.array([3, y, 1.7 - 1.05 / 2]))
+        return [at(3, y)] if time_s < 1.1 else [upper] if time_s > 1.5 else []
+    published = play(Tracker(), 3, walking)
+    assert {track_id for objects in published for track_id in ids(objects)} == {1}
+    assert published[50][0].status == VISIBLE
+
+
 def test_boxes_with_little_support_start_no_track_and_continue_one():
     weak = at(3, 0, support=0.15)
     assert not any(play(Tracker(), 1, lambda _time_s: [weak]))

@@ -10,7 +10,9 @@ from ros_3d_bb.tracking.kalman_filter import as_outlier, weighted
 RECENT_NS = 6 * NS // 10  # tracks matched less than this ago are associated before the others; chosen
 UNSURE_SHARE = 0.1  # upper bound of the new-target density, relative to the peak density of the detection; chosen
 HEAD_SIGMAS = 2.0  # standard deviation of the head top relative to that of the height; chosen: the camera tilts
-HIDDEN_FEET_COST = 4.0  # cost of a box whose top matches but whose height does not; chosen: its legs are occluded
+# Cost of a box whose top matches but whose height does not, as its legs are occluded; and if its lower end is so much
+# higher than the feet that it is hardly another person. Chosen: heights of people differ by less.
+HIDDEN_FEET_COST, HIDDEN_LEGS_COST, LEGS_M = 4.0, 1.0, 0.2
 CROWD = 200  # pairs from which on arrays are faster than numbers; measured with `./run bench speed`
 LOG_TWO_PI = math.log(2 * math.pi)
 
@@ -140,7 +142,8 @@ def height_cost(track, measurement, sigma_m):
 
     The height is unknown if the image border truncates the box, or has truncated all previous boxes of the track. The
     tops of the heads are then compared if both are known; otherwise the cost is 0. Where the height is known, the cost
-    is at most that of the tops plus `HIDDEN_FEET_COST`, because furniture occludes only the lower part of a body.
+    is at most that of the tops plus `HIDDEN_FEET_COST` or `HIDDEN_LEGS_COST`, because furniture occludes only the lower
+    part of a body.
     """
     _left, is_top_cut, _right, is_bottom_cut = measurement.detection.truncated_edges
     if not track.upper.hits or is_top_cut:
@@ -152,7 +155,8 @@ def height_cost(track, measurement, sigma_m):
     top_cost = (higher_m / (HEAD_SIGMAS * sigma_m)) ** 2 / 2
     if not track.lower.hits or is_bottom_cut:
         return top_cost
-    return min(((height_m - seen_m) / sigma_m) ** 2 / 2, top_cost + HIDDEN_FEET_COST)
+    hidden_cost = HIDDEN_LEGS_COST if height_m - seen_m - higher_m > LEGS_M else HIDDEN_FEET_COST
+    return min(((height_m - seen_m) / sigma_m) ** 2 / 2, top_cost + hidden_cost)
 
 
 def _assigned(costs):
