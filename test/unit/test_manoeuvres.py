@@ -61,6 +61,15 @@ def test_a_person_who_crouches_and_is_missed_once_keeps_the_id():
     assert len(ids(play(15, 4, boxes_at))) == 1
 
 
+@pytest.mark.parametrize('velocity_mps', [0.0, -0.8])
+def test_a_person_who_stops_or_turns_while_missed_keeps_the_id(velocity_mps):
+    """For 0.37 s. Before, the person walked at 1.2 m/s."""
+    def boxes_at(time_s):
+        place = (4.0, 1.2 * min(time_s - 1.5, 0.0) + velocity_mps * max(time_s - 1.5, 0.0))
+        return [] if 1.51 < time_s < 1.86 else [place]
+    assert len(ids(play(30, 3, boxes_at))) == 1
+
+
 @pytest.mark.parametrize('rate_hz', [3, 5, 10, 30])
 def test_a_person_found_in_every_second_image_is_published(rate_hz):
     outputs = play(rate_hz, 10, lambda time_s: [(3.0, 0.0)] if round(time_s * rate_hz) % 2 == 0 else [])

@@ -7,7 +7,7 @@ the association decides contested pairs by their likelihood.
 The reach is the distance that a person covers in the time between two images. It is measured from the latest box and
 not from the prediction, because the prediction overshoots where a person turns. A track without a box in the latest
 image has no such reach, because the person may be occluded, and the box that of another one. If it was detected just
-before, only a box at the same place belongs to it, as of a person who crouches.
+before, only a box on this side of its predicted place belongs to it, as of a person who crouches, stops or turns.
 """
 import math
 
@@ -20,10 +20,11 @@ from ros_3d_bb.tracking.track import LatestBox
 RUNNING_MPS = 6.0  # of new tracks, whose velocity is unknown: people run no faster indoors
 TURNING_MPS = 1.5  # beside the speed of the track: walking people start, stop and turn within this change of velocity
 BESIDE_M = 0.1  # difference of two boxes of a standing person
-RISING_MPS = 2.0  # of heads: people who sit down, stand up or bend are slower
+RISING_MPS, MOST_RISE_M = 2.0, 0.5  # of heads: people who sit down, stand up or bend are slower, or do so for longer
 BESIDE_SIGMAS = 2.0  # difference of the heads of two boxes of a standing person, relative to `height_sigma`
 SETTLED_NS = NS // 2  # the velocity of a track is known this long after its first detection
-RECENT_NS = NS // 4  # a person who is missed for less may still be at the same place
+RECENT_NS = 4 * NS // 10  # a person who is missed for less may have stopped or turned
+STOPPED = 0.7  # share of the way to the predicted place that such a person has gone at most
 LONGEST_NS = NS  # between two images; chosen: after longer, anyone may be within reach
 
 
@@ -56,18 +57,20 @@ def match_manoeuvres(tracks, measurements, matches, latest_ns, stamp_ns, height_
 
 
 def _is_within_reach(track, measurement, stamp_ns, may_move, height_sigma_m):
-    """Whether the object of a track, which stays where it is unless it `may_move`, may be at a measurement."""
+    """Whether the object of a track, which stops or turns unless it `may_move` on, may be at a measurement."""
     if track.kind.group != measurement.kind.group:
         return False
     elapsed_s, box = (stamp_ns - track.last_ns) / NS, LatestBox.of(measurement)
+    walking_mps = math.hypot(track.state.u, track.state.v)
     if stamp_ns - track.first_ns < SETTLED_NS:
-        speed_mps = RUNNING_MPS
+        moving_mps = RUNNING_MPS
         is_similar = height_cost(track, measurement, height_sigma_m) < HIDDEN_FEET_COST
     else:
-        speed_mps = math.hypot(track.state.u, track.state.v) + TURNING_MPS
-        rise_m = RISING_MPS * elapsed_s + BESIDE_SIGMAS * height_sigma_m
+        moving_mps = walking_mps + TURNING_MPS
+        rise_m = min(RISING_MPS * elapsed_s, MOST_RISE_M) + BESIDE_SIGMAS * height_sigma_m
         is_similar = track.is_confirmed and abs(box.head_m - track.latest.head_m) < rise_m
-    return is_similar and _distance_m(track, box) < (speed_mps * elapsed_s if may_move else 0.0) + BESIDE_M
+    speed_mps = moving_mps if may_move else STOPPED * walking_mps
+    return is_similar and _distance_m(track, box) < speed_mps * elapsed_s + BESIDE_M
 
 
 def _distance_m(track, box):
