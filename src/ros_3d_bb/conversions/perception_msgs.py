@@ -11,9 +11,8 @@ from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 
 from ros_3d_bb import msg
 from ros_3d_bb.camera.camera_model import Camera, transform_from
-from ros_3d_bb.core.labels import PERSON, label_fault, score_fault, usable_label
+from ros_3d_bb.core.object_classes import MAX_COORDINATE_M, MAX_SIZE_M, PERSON, label_fault, score_fault, usable_label
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.core.valid_ranges import MAX_COORDINATE_M, MAX_SIZE_M
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.tracking.types import TrackedObject
@@ -83,8 +82,8 @@ def boxes2d_to_msg(boxes, header, labels=None, scores=None, image_size=None):
 
     `boxes` (n, 4) are x1, y1, x2, y2 in pixels, which are rounded to integers; `header` is that of the image. `labels`
     are the class names of the boxes, and `scores` are 0..1; both follow in the layout if they are given. Characters of
-    class names that the layout cannot carry are replaced (`labels.usable_label`). The (width, height) of the image
-    shows whether it has the size of the camera_info.
+    class names that the layout cannot carry are replaced (`usable_label`). The (width, height) of the image shows
+    whether it has the size of the camera_info.
     """
     message = Int32MultiArray(data=np.rint(boxes).astype(int).ravel().tolist())
     label = 'boxes;stamp=%d.%09d;frame=%s' % (header.stamp.secs, header.stamp.nsecs, header.frame_id)

@@ -9,8 +9,7 @@ from typing import Any, NamedTuple, Optional, Tuple
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.core.labels import PERSON
-from ros_3d_bb.core.valid_ranges import MAX_COORDINATE_M, MAX_SIZE_M
+from ros_3d_bb.core.object_classes import MAX_COORDINATE_M, MAX_SIZE_M, PERSON
 
 # A box whose edge is this close to the image border, in pixels plus a share of its extent, counts as truncated. Chosen:
 # detectors regress the edge of a truncated person up to 8 pixels inside the image, farther for larger boxes. A person

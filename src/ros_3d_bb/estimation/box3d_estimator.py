@@ -5,8 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ros_3d_bb.camera.depth_image import FARTHEST_M
-from ros_3d_bb.core.labels import PERSON
-from ros_3d_bb.core.object_classes import ObjectClasses
+from ros_3d_bb.core.object_classes import PERSON, ObjectClasses
 from ros_3d_bb.estimation.box3d import LEVEL, Box3D, ImageGeometry, truncated_edges, without_distortion
 from ros_3d_bb.estimation.depth_samples import BODY_HALF_DEPTH_MM, grid_in
 from ros_3d_bb.estimation.foreground import estimate_foreground

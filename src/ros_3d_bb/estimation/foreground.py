@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.core.labels import PERSON
+from ros_3d_bb.core.object_classes import PERSON
 from ros_3d_bb.estimation.box3d import (Box3D, complete_truncated_extent, slopes_down, truncated_edges,
                                         without_distortion)
 from ros_3d_bb.estimation.depth_samples import (BESIDE_TRUNK_M, BODY_HALF_DEPTH_MM, FEET_M, LEAST_SIZE, LOOKS_DOWN,

@@ -3,8 +3,7 @@ from collections import deque
 
 import numpy as np
 
-from ros_3d_bb.core.labels import PERSON
-from ros_3d_bb.core.object_classes import PERSON_CLASS
+from ros_3d_bb.core.object_classes import PERSON, PERSON_CLASS
 
 LATEST = 20  # people that must agree
 LEAST_SUPPORT = 0.3  # boxes with less are often those of other objects

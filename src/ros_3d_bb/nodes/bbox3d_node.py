@@ -9,8 +9,8 @@ from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, INFO_TO
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, boxes3d_to_msg, camera_from_msg,
                                                    header_of, stamp_of)
-from ros_3d_bb.core.labels import described
 from ros_3d_bb.core.latest_worker import NewestWorker
+from ros_3d_bb.core.object_classes import described
 from ros_3d_bb.core.time_sync import NS, MessageCache, arrival_clock_ns
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics

@@ -5,8 +5,7 @@ from typing import Callable, NamedTuple, Optional, Sequence, Tuple
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera, upright_turns
-from ros_3d_bb.core.labels import PERSON
-from ros_3d_bb.core.object_classes import ObjectClasses
+from ros_3d_bb.core.object_classes import PERSON, ObjectClasses
 from ros_3d_bb.core.params import Param
 from ros_3d_bb.tracking.ignored_areas import IgnoredAreas
 

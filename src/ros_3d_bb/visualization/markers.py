@@ -8,7 +8,7 @@ from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ros_3d_bb.core.labels import described
+from ros_3d_bb.core.object_classes import described
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
