@@ -8,7 +8,7 @@ import os
 
 import numpy as np
 
-from ros_3d_bb.camera.depth_image import FARTHEST_M
+from ros_3d_bb.camera.images import FARTHEST_M
 from ros_3d_bb.estimation.box3d import plausible
 from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.sessions.session_reader import (FILE_NAME, Session, SessionError, boxes_of_others, camera_of, read_color,

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.object_classes import PERSON_CLASS
 from ros_3d_bb.estimation.box3d import ImageGeometry, truncated_edges
 from ros_3d_bb.estimation.box3d_estimator import (estimate_boxes, estimate_median, estimator_named, sample_depth,

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.estimation.box3d import LEVEL, Box3D
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.scale_check import LATEST, ScaleCheck

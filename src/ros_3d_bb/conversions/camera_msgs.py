@@ -10,8 +10,8 @@ from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.camera.camera_model import Camera, quaternion_from
-from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.camera.distortion import PLUMB_BOB
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.conversions.image_msgs import fill_image, is_compressed, pixels_from
 from ros_3d_bb.core.time_sync import NS
 

@@ -6,7 +6,7 @@ OpenCV is imported only where it is used, see `camera.distortion`.
 """
 import numpy as np
 
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.conversions.compressed_images import decode
 
 # encoding: (dtype without byte order, channels)

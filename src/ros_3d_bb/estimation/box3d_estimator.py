@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.camera.depth_image import FARTHEST_M
+from ros_3d_bb.camera.images import FARTHEST_M
 from ros_3d_bb.core.object_classes import PERSON, ObjectClasses
 from ros_3d_bb.estimation.box3d import LEVEL, Box3D, ImageGeometry, truncated_edges, without_distortion
 from ros_3d_bb.estimation.depth_samples import BODY_HALF_DEPTH_MM, grid_in
@@ -115,7 +115,7 @@ def estimate_boxes(depth, rects_px, camera, estimator, level_from_camera=LEVEL, 
 
     Parameters
     ----------
-    depth : depth_image.DepthImage
+    depth : images.DepthImage
     rects_px : list of (x1, y1, x2, y2)
     camera : camera_model.Camera
     estimator : Estimator

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.camera.image_rotation import turned_rotation
+from ros_3d_bb.camera.images import turned_rotation
 from ros_3d_bb.core.object_classes import read_object_classes
 from ros_3d_bb.core.params import (CLASSES_FILE, DEPTH, DEPTH_SCALE, IMAGE_ROTATION, LARGEST, STAMP_TOLERANCE, Param,
                                    parameters)

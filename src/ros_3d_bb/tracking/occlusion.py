@@ -157,7 +157,7 @@ def depths_towards(camera, depth, points):
     Parameters
     ----------
     camera : camera_model.Camera
-    depth : depth_image.DepthImage
+    depth : images.DepthImage
     points : numpy.ndarray, (k, 3)
         In the optical frame, metres.
 

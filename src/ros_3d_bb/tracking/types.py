@@ -4,7 +4,8 @@ from typing import Callable, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from ros_3d_bb.camera.camera_model import Camera, upright_turns
+from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.images import quarter_turns
 from ros_3d_bb.core.object_classes import PERSON, ObjectClasses
 from ros_3d_bb.core.params import Param
 from ros_3d_bb.tracking.ignored_areas import IgnoredAreas
@@ -58,7 +59,8 @@ def detections_from_boxes(boxes, fixed_from_camera, classes=ObjectClasses()):
         Pose of the camera's optical frame in the fixed frame.
     classes : object_classes.ObjectClasses
     """
-    turns, rows, rotation = upright_turns(fixed_from_camera), fixed_from_camera[:3].tolist(), fixed_from_camera[:3, :3]
+    turns = quarter_turns(fixed_from_camera[2, :3])  # the z axis of the fixed frame points up
+    rows, rotation = fixed_from_camera[:3].tolist(), fixed_from_camera[:3, :3]
     detections = []
     for index, box in boxes.items():
         (x, y, z), (width_m, height_m) = map(float, box.center_m), map(float, box.size_m[:2])
