@@ -18,7 +18,7 @@ from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.association import associate
 from ros_3d_bb.tracking.birth import NEW_NS, duplicates, initiate
-from ros_3d_bb.tracking.common_motion import (FEWEST, SETTLED_NS, camera_velocity, common_motion, may_jump, most_fit,
+from ros_3d_bb.tracking.common_motion import (FEWEST, SETTLED_NS, camera_motion, common_motion, may_jump, most_fit,
                                               moved, pose_jump)
 from ros_3d_bb.tracking.ignored_areas import IgnoredAreas, polygons_from
 from ros_3d_bb.tracking.manoeuvres import match_manoeuvres
@@ -189,15 +189,17 @@ class Tracker(TrackerBase):
 
     def _step(self, before, image, observed_s, assign_id):
         """One cycle of the tracker: see `step` of OutOfSequenceBuffer."""
+        camera = camera_motion(before.cameras.get(image.view.camera), image)
         tracks = self._predict(before, image.stamp_ns)
-        measurements = self._measure(before, image)
-        matches, fits, is_moved = self._associate(before, tracks, measurements, image)
-        if len(matches) < len(measurements) and not is_moved:
-            matches += self._match_manoeuvres(before, tracks, measurements, matches, image)
+        measurements = self._measure(before, image, camera.period_s)
+        matches, fits, is_moved = self._associate(before, tracks, measurements, image, camera)
+        if len(matches) < len(measurements) and not is_moved and camera.previous:
+            matches += match_manoeuvres(tracks, measurements, matches, camera.previous.stamp_ns, image.stamp_ns,
+                                        self._params[0].height_sigma)
         matched = {track.id: (track.is_confirmed, measurement.number) for track, measurement in matches}
         log_noise_scale = learned_log_scale(before.log_noise_scale, matches)
         self._update_matched(matches, log_noise_scale - max(before.log_noise_scale, 0), image)
-        cameras = self._cameras_after(before, image, matches, fits)
+        cameras = self._cameras_after(before, image, camera, matches, fits)
         missed = [track for track in tracks if track.id not in matched]
         if missed:
             mark_missed(missed, tracks, before.tracks, cameras, image.view.camera, observed_s,
@@ -220,26 +222,25 @@ class Tracker(TrackerBase):
         acceleration = self._params[0].acceleration
         return [track.predicted(elapsed_s, acceleration) for track in before.tracks]
 
-    def _measure(self, before, image):
+    def _measure(self, before, image, period_s):
         """The measurements of the image, with the noise for the association: a learned scale that is too small must not
         separate people from their tracks."""
         params, noise, _prediction = self._params
-        images = correlated_images(_period_s(before, image), self._detector, params.acceleration)
+        images = correlated_images(period_s, self._detector, params.acceleration)
         noise = BoxNoise(noise.noise_unknown, math.exp(max(before.log_noise_scale, 0)), self._detector.lasting_sigma_m,
                          images)
         return measurements_of(image.detections, image.view, noise, self._kinds)
 
-    def _associate(self, before, tracks, measurements, image):
+    def _associate(self, before, tracks, measurements, image, camera):
         """Assign measurements to tracks; if the pose of the camera jumped, the tracks are moved before.
 
         Returns the matches [(Track, Measurement)], whether most people fit without a motion (None if unknown), and
         whether there was one.
         """
         stamp_ns, params, outliers = image.stamp_ns, self._params[0], self._rules.outliers
-        latest, period_s = before.cameras.get(image.view.camera), _period_s(before, image)
-        known = [track for track in tracks if latest and track.is_confirmed
+        known = [track for track in tracks if camera.previous and track.is_confirmed
                  and track.visibility.get(image.view.camera) == SEEN]
-        motion = pose_jump(latest, known, measurements, image.view, period_s)
+        motion = pose_jump(camera, known, measurements, image.view)
         if motion is not None:
             return self._associate_moved(tracks, measurements, image, motion), None, True
         matches = associate(tracks, measurements, stamp_ns, params, outliers)
@@ -248,9 +249,9 @@ class Tracker(TrackerBase):
         fits = most_fit(known, matches, len(measurements))
         is_settled = before.misfit_ns is None or stamp_ns - before.misfit_ns > SETTLED_NS
         if fits is not False or not is_settled or not may_jump(
-                latest, recent_others(before.cameras, image.view.camera, stamp_ns).values()):
+                camera.previous, recent_others(before.cameras, image.view.camera, stamp_ns).values()):
             return matches, fits, False
-        motion = common_motion(known, measurements, image.view, period_s)
+        motion = common_motion(known, measurements, image.view, camera.period_s)
         if motion is None:
             return matches, fits, False
         return self._associate_moved(tracks, measurements, image, motion), fits, True
@@ -261,31 +262,22 @@ class Tracker(TrackerBase):
             track.state = moved(track.state, *motion, view=image.view)
         return associate(tracks, measurements, image.stamp_ns, self._params[0], self._rules.outliers)
 
-    def _match_manoeuvres(self, before, tracks, measurements, matches, image):
-        """The further matches [(Track, Measurement)] of people who leave the gate, see `manoeuvres`."""
-        latest = before.cameras.get(image.view.camera)
-        if latest is None:
-            return []
-        return match_manoeuvres(tracks, measurements, matches, latest.stamp_ns, image.stamp_ns,
-                                self._params[0].height_sigma)
-
     def _update_matched(self, matches, log_factor, image):
         """Update the tracks of the matches, with the variance of assumed noise multiplied by exp(`log_factor`)."""
         scale = math.exp(log_factor)
         for track, measurement in matches:
             track.update(scaled(measurement, scale), image.stamp_ns, image.view.camera, self._rules)
 
-    def _cameras_after(self, before, image, matches, fits):
+    def _cameras_after(self, before, image, camera, matches, fits):
         """The CameraState of each camera after an image with matches."""
-        latest = before.cameras.get(image.view.camera)
+        latest = camera.previous
         range_m = self._detector.max_range_m
         if range_m is None:
             range_m = learned_range(latest.range_m if latest else DEFAULT_RANGE_M, matches)
         if fits is None and latest:
             fits = latest.fits
         cameras = {name: known for name, known in before.cameras.items() if image.stamp_ns - known.stamp_ns <= KNOWN_NS}
-        cameras[image.view.camera] = CameraState(
-            image.stamp_ns, image.view, range_m, fits, camera_velocity(latest, image.view, _period_s(before, image)))
+        cameras[image.view.camera] = CameraState(image.stamp_ns, image.view, range_m, fits, camera.velocity)
         return cameras
 
     def _delete(self, tracks, stamp_ns):
@@ -302,9 +294,3 @@ class Tracker(TrackerBase):
             elif not track.is_confirmed:
                 untracked_boxes += track.hits
         return kept, untracked_boxes
-
-
-def _period_s(before, image):
-    """Time since the previous image of the same camera, seconds; 0 without one."""
-    latest = before.cameras.get(image.view.camera)
-    return (image.stamp_ns - latest.stamp_ns) / NS if latest else 0.0
