@@ -2,7 +2,7 @@
 
 Each person is tracked by a constant-velocity Kalman filter in the plane (`kalman_filter`). Detections are assigned to
 tracks by maximum total likelihood (`association`). A detection that a new target explains better starts a track
-(`birth`), which is published once it is likely to be a person (`track`). If most people seem to jump in the same way,
+(`initiate`) that is published once it is likely to be a person (`track`). If most people seem to jump in the same way,
 the pose of the camera jumped, and all tracks are moved (`common_motion`). Undetected people are not dropped
 immediately: their tracks stay published for a short time if a camera should detect them, and for longer if a person or
 an object occludes them (`occlusion`). Unpublished tracks are kept for longer still, so that people who reappear keep
@@ -16,8 +16,7 @@ from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.association import associate
-from ros_3d_bb.tracking.birth import NEW_NS, duplicates, initiate
+from ros_3d_bb.tracking.association import NEW_NS, associate, duplicates, initiate
 from ros_3d_bb.tracking.common_motion import (FEWEST, SETTLED_NS, camera_motion, common_motion, may_jump, most_fit,
                                               moved, pose_jump)
 from ros_3d_bb.tracking.ignored_areas import IgnoredAreas, polygons_from
