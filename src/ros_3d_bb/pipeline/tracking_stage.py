@@ -218,14 +218,14 @@ class TrackingStage(object):
             if depth.shape != (intrinsics.height, intrinsics.width):
                 return view
             return view._replace(depth_at=functools.partial(depths_towards, intrinsics, depth),
-                                 area_px=depth.measured_area())
+                                 measured_area=depth.measured_area)
         try:
             geometry = self._registrations[camera].geometry(depth, depth_frame, intrinsics,
                                                             self._params.camera_frame or boxes_frame)
         except ValueError:
             return view
         return view._replace(depth_at=functools.partial(_depths_from_beside, geometry, depth),
-                             area_px=geometry.area_px)
+                             measured_area=lambda: geometry.area_px)
 
     def _accept(self, stamp_ns, now_ns, camera):
         """Whether the stamp of boxes is consistent with those of the other cameras. Handles backward jumps in time, as

@@ -99,15 +99,15 @@ class CameraView(NamedTuple):
 
     `intrinsics` is None if unknown. `camera` identifies the camera. `depth_at` is None without a depth image; otherwise
     it is a function that takes points (k, 3) in the optical frame and returns the depths (k,) measured in their
-    direction, metres, nan without valid depth. `area_px` is the part of the image (x1, y1, x2, y2) in which depth is
-    measured; None: all of it.
+    direction, metres, nan without valid depth. `measured_area` returns the part of the image (x1, y1, x2, y2) in which
+    depth is measured; None: all of it.
     """
 
     fixed_from_camera: np.ndarray
     intrinsics: Optional[Camera] = None
     camera: str = ''
     depth_at: Optional[Callable[[np.ndarray], np.ndarray]] = None
-    area_px: Optional[Tuple[int, int, int, int]] = None
+    measured_area: Optional[Callable[[], Tuple[int, int, int, int]]] = None
 
     @property
     def ahead(self):
