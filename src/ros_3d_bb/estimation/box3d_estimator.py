@@ -113,13 +113,6 @@ def estimate_boxes(depth, rects_px, camera, estimator, level_from_camera=LEVEL, 
     return [box and (box if label == box.label else box._replace(label=label)) for box, label in zip(boxes, labels)]
 
 
-def check_rect(rect_px):
-    """Raise ValueError if a rectangle is empty or reversed."""
-    x1, y1, x2, y2 = rect_px
-    if x1 >= x2 or y1 >= y2:
-        raise ValueError('box (%d, %d, %d, %d) is empty or reversed: x1 < x2 and y1 < y2 expected' % (x1, y1, x2, y2))
-
-
 def level_rotation(up):
     """Rotation (3, 3) from the optical frame to the level frame, given the unit vector `up` (3,) in the optical frame.
 

@@ -1,5 +1,6 @@
 """Estimation stage: 3D boxes from frames and 2D boxes, shared by bbox3d_node and the pipeline in one process."""
 import functools
+import itertools
 from collections import deque
 from typing import NamedTuple
 
@@ -10,7 +11,7 @@ from ros_3d_bb.core.object_classes import PERSON, PERSON_CLASS, read_object_clas
 from ros_3d_bb.core.params import (CLASSES_FILE, DEPTH, DEPTH_SCALE, IMAGE_ROTATION, LARGEST, STAMP_TOLERANCE, Param,
                                    parameters)
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named, level_rotation
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, error_model_of_param
 
 # Check of the scale of depth images.
@@ -114,15 +115,13 @@ class EstimationStage(object):
 
     def _usable_boxes(self, boxes2d):
         """Return the Boxes2D whose rectangles are neither empty nor reversed."""
-        usable = []
-        for number, rect_px in enumerate(boxes2d.boxes.tolist()):
-            try:
-                check_rect(rect_px)
-                usable.append(number)
-            except ValueError as error:
-                self._events.warn('boxes rejected', '2D %s; the others in this image are used' % error)
-        return boxes2d._replace(boxes=boxes2d.boxes[usable], labels=[boxes2d.labels[number] for number in usable],
-                                scores=boxes2d.scores[usable])
+        boxes = boxes2d.boxes
+        is_usable = (boxes[:, 0] < boxes[:, 2]) & (boxes[:, 1] < boxes[:, 3])
+        for rect_px in boxes[~is_usable].tolist():
+            self._events.warn('boxes rejected', '2D box (%d, %d, %d, %d) is empty or reversed: x1 < x2 and y1 < y2 '
+                              'expected; the others in this image are used' % tuple(rect_px))
+        return boxes2d._replace(boxes=boxes[is_usable], labels=list(itertools.compress(boxes2d.labels, is_usable)),
+                                scores=boxes2d.scores[is_usable])
 
 
 def _as_received(box, frame):

@@ -100,7 +100,7 @@ class RgbdSource(object):
             frame_id = self._params.frame_id or self._color_frame
             registration = self._registration.geometry(depth, depth_frame, camera, frame_id)
             return RegisteredDepth(depth, registration), frame_id
-        height, width = depth.shape
+        height, width = depth.values.shape
         if (width, height) != (camera.width, camera.height):
             raise ValueError('%s; depth must be aligned to colour: %s' % (size_fault(camera, width, height), ALIGN))
         return depth, self._params.frame_id or depth_frame

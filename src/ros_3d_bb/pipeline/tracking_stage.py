@@ -215,7 +215,7 @@ class TrackingStage(object):
         """Return a CameraView with a depth image; without one that cannot be used, which bbox3d_node reports."""
         intrinsics = view.intrinsics
         if camera not in self._registrations:
-            if depth.shape != (intrinsics.height, intrinsics.width):
+            if depth.values.shape != (intrinsics.height, intrinsics.width):
                 return view
             return view._replace(depth_at=functools.partial(depths_towards, intrinsics, depth),
                                  measured_area=depth.measured_area)
