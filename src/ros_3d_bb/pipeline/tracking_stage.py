@@ -172,7 +172,7 @@ class TrackingStage(object):
             raise ValueError('none of their %d boxes is valid; tracks are kept as they are' % len(faults))
         if camera:
             self._check_frame(message.header.frame_id, camera)
-        motions, untracked = self._tracker.common_motions, self._tracker.untracked_boxes
+        before = self._tracker.totals
         detections = detections_from_boxes(boxes, fixed_from_camera, self._classes)
         tracks = self._tracker.update(stamp_ns, detections,
                                       self._view(message.header, fixed_from_camera, camera, camera_name))
@@ -181,9 +181,10 @@ class TrackingStage(object):
             ignored = sum(areas.contains(detection.position_m, fixed_from_camera[:2, 3]) for detection in detections)
             self._events.count('boxes in ignored areas', ignored)
         self._events.count('images tracked')
-        if self._tracker.untracked_boxes > untracked:
-            self._events.count('3D boxes that became no track', self._tracker.untracked_boxes - untracked)
-        if self._tracker.common_motions > motions:
+        totals = self._tracker.totals
+        if totals.untracked_boxes > before.untracked_boxes:
+            self._events.count('3D boxes that became no track', totals.untracked_boxes - before.untracked_boxes)
+        if totals.common_motions > before.common_motions:
             self._events.warn('common motion compensated', 'the people at %.3f jumped together: the pose of the camera '
                               'in %s jumped, as after an error of the odometry; all tracks are moved with them'
                               % (stamp_ns / NS, self._params.target_frame))

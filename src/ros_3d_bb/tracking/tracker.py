@@ -28,7 +28,7 @@ from ros_3d_bb.tracking.occlusion import CameraState, mark_missed, recent_others
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, OutOfSequenceBuffer
 from ros_3d_bb.tracking.track import (MIN_TRACK_SCORE, SEEN, PredictionParams, Rules, Track, learned_prediction,
                                       published)
-from ros_3d_bb.tracking.types import MOVING_SPEED, VISIBLE, TrackerBase
+from ros_3d_bb.tracking.types import MOVING_SPEED, VISIBLE, Totals, TrackerBase
 
 KNOWN_NS = 60 * NS  # a camera without images for longer than this, while others send images, counts as new; chosen
 MAX_POSITION_STD_M = 2.4  # tracks whose position is less certain are dropped; chosen
@@ -88,17 +88,16 @@ class TrackerParams(NamedTuple):
 
 class _State(NamedTuple):
     """State of the tracker after an image: the tracks, the stamp of the latest image, the `CameraState` of each camera,
-    the number of images with a common motion, the stamp of the latest image that most people did not fit (None
-    without), the learned `measurement_model.learned_log_scale`, and the number of boxes that never became a track.
+    the stamp of the latest image that most people did not fit (None without), the learned
+    `measurement_model.learned_log_scale`, and the Totals.
     """
 
     tracks: Sequence[Track]
     now_ns: Optional[int]
     cameras: dict
-    common_motions: int
     misfit_ns: Optional[int]
     log_noise_scale: float
-    untracked_boxes: int
+    totals: Totals
 
 
 class Tracker(TrackerBase):
@@ -120,7 +119,7 @@ class Tracker(TrackerBase):
         self.reconfigure(params, noise, prediction)
 
     def _start(self, last_id, log_noise_scale=0.0):
-        self._buffer = OutOfSequenceBuffer(self._step, _State([], None, {}, 0, None, log_noise_scale, 0), last_id)
+        self._buffer = OutOfSequenceBuffer(self._step, _State([], None, {}, None, log_noise_scale, Totals()), last_id)
 
     def reconfigure(self, params, noise, prediction):
         """Change the parameters and keep the tracks. Raises ValueError without any change if one is invalid."""
@@ -165,14 +164,9 @@ class Tracker(TrackerBase):
         return self._published()
 
     @property
-    def common_motions(self):
-        """Number of images in which the pose of the camera jumped (`common_motion`), since the last reset."""
-        return self._buffer.state.common_motions
-
-    @property
-    def untracked_boxes(self):
-        """Number of boxes that never became a track, since the last reset: their tracks ended unpublished."""
-        return self._buffer.state.untracked_boxes
+    def totals(self):
+        """The Totals until the newest image."""
+        return self._buffer.state.totals
 
     def tracks(self):
         """The published tracks as TrackedObject, ordered by ID, at the stamp of the newest image; with all images."""
@@ -211,8 +205,8 @@ class Tracker(TrackerBase):
                          and not self.ignored.contains((measurement.x, measurement.y), camera_m)]
             tracks += initiate(tracks, unmatched, image, self._params[0], self._rules, assign_id)
         misfit_ns = image.stamp_ns if fits is False else before.misfit_ns
-        state = _State(tracks, image.stamp_ns, cameras, before.common_motions + is_moved, misfit_ns, log_noise_scale,
-                       before.untracked_boxes + untracked_boxes)
+        totals = Totals(before.totals.common_motions + is_moved, before.totals.untracked_boxes + untracked_boxes)
+        state = _State(tracks, image.stamp_ns, cameras, misfit_ns, log_noise_scale, totals)
         return state, [(track_id,) + match for track_id, match in matched.items()]
 
     def _predict(self, before, stamp_ns):

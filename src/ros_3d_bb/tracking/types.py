@@ -157,13 +157,21 @@ class TrackedObject(NamedTuple):
     detection: int = NOT_DETECTED
 
 
+class Totals(NamedTuple):
+    """Number of images in which the pose of the camera jumped (`common_motion`), and of boxes whose tracks ended
+    unpublished, since the last reset.
+    """
+
+    common_motions: int = 0
+    untracked_boxes: int = 0
+
+
 class TrackerBase(object):
     """Base class of the trackers. The IDs of tracks are greater than `last_id` of the constructor, and tracks never
     change between the groups of its table of classes, an `object_classes.ObjectClasses`.
     """
 
-    common_motions = 0  # number of images in which the pose of the camera jumped
-    untracked_boxes = 0  # number of boxes that never became a track
+    totals = Totals()
     ignored = IgnoredAreas()  # where no track starts
 
     def reconfigure(self, *params):
