@@ -8,9 +8,9 @@ import os
 
 import numpy as np
 
-from ros_3d_bb.camera.depth_image import FARTHEST_M
+from ros_3d_bb.camera.images import FARTHEST_M
 from ros_3d_bb.estimation.box3d import plausible
-from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named, level_rotation
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.sessions.session_reader import (FILE_NAME, Session, SessionError, boxes_of_others, camera_of, read_color,
                                                read_depth, read_description, session_errors)
 from ros_3d_bb.sessions.session_writer import locked_update
@@ -84,8 +84,9 @@ class Document(object):
 
         Returns None if there is not enough depth. Raises ValueError if the depth cannot be read, or the box is empty.
         """
-        box_px = tuple(int(edge) for edge in box_px)
-        check_rect(box_px)
+        x1, y1, x2, y2 = box_px = tuple(int(edge) for edge in box_px)
+        if x1 >= x2 or y1 >= y2:
+            raise ValueError('box (%d, %d, %d, %d) is empty or reversed' % box_px)
         detections = self.measurements[index].detections
         others_px = [detection.box_px for detection in detections if detection.box_px not in (None, box_px)]
         if not any(detection.box_px == box_px and not detection.by_hand for detection in detections):

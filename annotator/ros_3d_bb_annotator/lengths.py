@@ -1,7 +1,7 @@
 """Lengths with units: parsing and formatting."""
 import re
 
-from ros_3d_bb.camera.depth_image import FARTHEST_M
+from ros_3d_bb.camera.images import FARTHEST_M
 
 METRES = {'m': 1.0, 'cm': 0.01, 'mm': 0.001}
 

@@ -22,7 +22,7 @@ class MarkedBox(NamedTuple):
 
 
 class Scene(NamedTuple):
-    """Overlay of an image: boxes, index of the person's box or None, and visible depth_samples.Samples."""
+    """Overlay of an image: boxes, index of the person's box or None, and visible box3d_estimator.Samples."""
 
     boxes: Tuple[MarkedBox, ...]
     person: Optional[int]

@@ -10,7 +10,7 @@ from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS, CameraFrame, messages_of, transform_messages
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg,
                                                    time_from)

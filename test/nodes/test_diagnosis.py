@@ -17,7 +17,7 @@ from std_msgs.msg import Int32MultiArray
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.conversions.camera_msgs import CameraFrame, messages_of
 from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg
 from ros_3d_bb.core.time_sync import NS

@@ -3,12 +3,10 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.object_classes import PERSON_CLASS
 from ros_3d_bb.estimation.box3d import ImageGeometry, truncated_edges
-from ros_3d_bb.estimation.box3d_estimator import (estimate_boxes, estimate_median, estimator_named, sample_depth,
-                                                  sample_grid)
-from ros_3d_bb.estimation.foreground import estimate_foreground
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimate_foreground, estimator_named
 from ros_3d_bb.sessions.session_reader import read_depth, read_session
 
 CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
@@ -27,8 +25,8 @@ def test_the_median_reproduces_the_recorded_positions(session_folder):
     session = read_session(session_folder)
     errors_m = []
     for frame in session.frames[::2]:
-        samples = sample_depth(read_depth(frame, session), frame.boxes_px[0], 20)
-        box = estimate_median(samples, frame.boxes_px[0], of(session.camera))
+        depth, estimator = read_depth(frame, session), estimator_named('median')
+        (box,) = estimator.estimate(depth, frame.boxes_px[:1], of(session.camera), [PERSON_CLASS])
         errors_m.append(np.abs(box.center_m - frame.estimate_m))
     assert len(errors_m) >= 40
     assert np.max(errors_m) <= 0.0015
@@ -36,7 +34,7 @@ def test_the_median_reproduces_the_recorded_positions(session_folder):
 
 @given(st.integers(-90, 80), st.integers(-90, 80), st.integers(1, 200), st.integers(1, 200), st.integers(1, 30))
 def test_the_grid_is_centred_and_clipped_to_the_image(x1, y1, width, height, stride):
-    samples = sample_depth(flat(1000), (x1, y1, x1 + width, y1 + height), stride)
+    samples = estimator_named('median', stride).sample(flat(1000), (x1, y1, x1 + width, y1 + height))
     expected = []
     columns, rows = -(-width // stride), -(-height // stride)
     for v in range(y1 + (height - (rows - 1) * stride - 1) // 2, y1 + height, stride):
@@ -50,8 +48,8 @@ def test_the_grid_is_centred_and_clipped_to_the_image(x1, y1, width, height, str
                                                  (np.inf, 1, np.float32), (-1, 1, np.float32)])
 def test_no_estimate_without_valid_depth(depth, scale_m, dtype):
     image = flat(depth, scale_m, dtype)
-    assert not sample_grid(image, (0, 0, 64, 48)).valid.any()
     for name in ('foreground', 'median'):
+        assert not estimator_named(name).sample(image, (0, 0, 64, 48)).valid.any()
         outside = estimate_boxes(flat(2000), [(70, 10, 90, 20)], CAMERA, estimator_named(name))
         assert estimate_boxes(image, [(0, 0, 64, 48)], CAMERA, estimator_named(name)) == outside == [None]
 

@@ -3,10 +3,9 @@ import pytest
 from hypothesis import given, strategies as st
 from hypothesis.extra import numpy as hnp
 
-from ros_3d_bb.camera.camera_model import (OPTICAL_ROTATION, Camera, quarter_turns, quaternion_from, transform_from,
-                                           transform_points)
-from ros_3d_bb.camera.image_rotation import (mounted_camera, turned_boxes, turned_camera, turned_image, turned_rotation,
-                                             turns_for)
+from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, quaternion_from, transform_from, transform_points
+from ros_3d_bb.camera.images import (mounted_camera, quarter_turns, turned_boxes, turned_camera, turned_image,
+                                     turned_rotation, turns_for)
 
 D435I = Camera(640, 480, 614.686, 614.842, 319.199, 242.08)
 

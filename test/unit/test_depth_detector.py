@@ -4,7 +4,7 @@ import pytest
 
 from conftest import DATA
 from ros_3d_bb.camera.camera_model import Camera, transform_points
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.depth.ground_plane import Floor, floor_from_transform

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.estimation.box3d import LEVEL, plausible
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera, transform_points
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.detection.depth.ground_plane import MAX_HIGHER, FittedFloor, Floor, fit_floor, floor_from_transform
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from support.people import mounted

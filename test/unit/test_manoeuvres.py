@@ -98,12 +98,12 @@ def test_boxes_that_never_become_a_track_are_counted():
     """Three boxes, each too far from the one before to be of the same person; then a person who stays."""
     tracker = Tracker()
     play(5, 0.6, lambda time_s: [(3.0, 15.0 * time_s)], tracker)
-    assert not tracker.untracked_boxes  # their tracks are tentative
+    assert not tracker.totals.untracked_boxes  # their tracks are tentative
     for number in range(3, 20):
         tracker.update(START_NS + number * NS // 5, [at(3.0, -3.0)], VIEW)
-    assert tracker.untracked_boxes == 3
+    assert tracker.totals.untracked_boxes == 3
     tracker.reset()
-    assert not tracker.untracked_boxes
+    assert not tracker.totals.untracked_boxes
 
 
 @pytest.mark.parametrize('gap_s', [5.0, 3600.0, 6.3e7])

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.sessions.plausibility import FACTORS, likely_errors
 from ros_3d_bb.sessions.session_writer import append
 from ros_3d_bb.sessions.snapshots import ColorImage, Snapshot

@@ -5,7 +5,7 @@ import pytest
 import yaml
 
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.object_classes import (CLASSES, MAX_CLASSES, MAX_IN_GROUP, PERSON_CLASS, ObjectClass, ObjectClasses,
                                            object_classes_from, read_object_classes)
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named

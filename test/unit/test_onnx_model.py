@@ -3,7 +3,7 @@ import os
 import numpy as np
 import pytest
 
-from ros_3d_bb.core.labels import COCO
+from ros_3d_bb.core.object_classes import COCO
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetector
 from ros_3d_bb.detection.onnx.heads import P3, P6

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from, transform_points
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.planning.people_removal import are_inside, cylinders_of, pixels_inside, scan_points
 from ros_3d_bb.planning.planner_view import (covariances_after, footprint_points, in_frame, position_after,
                                              predicted_to, usable_tracks, with_usable_covariances)

@@ -5,8 +5,7 @@ import pytest
 
 from ros_3d_bb.camera.alignment import EdgeComparison
 from ros_3d_bb.camera.camera_model import Camera, transform_from
-from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.camera.image_rotation import turned_depth
+from ros_3d_bb.camera.images import DepthImage, turned_depth
 from ros_3d_bb.camera.registration import RegisteredDepth, Registration
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb_lab.simulation.scenario import scenario_from

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.estimation.box3d import LEVEL, Box3D
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
-from ros_3d_bb.estimation.scale_check import LATEST, ScaleCheck
+from ros_3d_bb.pipeline.estimation_stage import LATEST, ScaleCheck
 from ros_3d_bb.sessions.session_reader import read_depth, read_session
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator

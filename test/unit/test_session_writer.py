@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.atomic_file import atomic_write
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import Box3D

@@ -1,8 +1,7 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.core.camera_clocks import ALIVE_NS, LONGEST_LAG_NS, CameraClocks
-from ros_3d_bb.core.time_sync import NS, StampSynchronizer
+from ros_3d_bb.core.time_sync import ALIVE_NS, LONGEST_LAG_NS, NS, CameraClocks, StampSynchronizer
 
 MS = NS // 1000
 PERIOD = 33 * MS

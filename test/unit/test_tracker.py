@@ -239,7 +239,7 @@ def test_people_keep_their_ids_when_the_odometry_jumps(jump_m, angle, rate_hz):
     jumped = mounted(1, yaw_deg=np.degrees(angle))
     jumped[:2, 3] = jump_m
     after = play(tracker, 1, detections, rate_hz, 1, CameraView(jumped, CAMERA))
-    assert ids(before) == [1, 2, 3, 4, 5] and tracker.common_motions == 1
+    assert ids(before) == [1, 2, 3, 4, 5] and tracker.totals.common_motions == 1
     for frame, objects in enumerate(after):
         assert ids(objects) == ids(before)
         errors_m = np.array([track.position_m[:2] for track in objects]) - places(1 + frame / rate_hz)
@@ -265,7 +265,7 @@ def test_a_jump_of_the_pose_gives_standing_people_no_velocity(jump_m, people, ra
         if time_s >= 3:
             assert ids(tracks) == [1, 2][:people]
             assert max(np.linalg.norm(track.velocity_mps) for track in tracks) < 0.2
-    assert tracker.common_motions == 1
+    assert tracker.totals.common_motions == 1
 
 
 def test_a_person_who_steps_aside_does_not_move_the_frame():
@@ -277,7 +277,7 @@ def test_a_person_who_steps_aside_does_not_move_the_frame():
         pose[0, 3] = max(time_s - 2, 0) ** 2
         tracker.update(START_NS + int(round(time_s * NS)), [at(3 + pose[0, 3], 0.5 * (time_s >= 2))],
                        CameraView(pose, CAMERA))
-    assert not tracker.common_motions
+    assert not tracker.totals.common_motions
 
 
 def test_the_prediction_of_people_who_manoeuvre_is_less_certain():
@@ -305,6 +305,6 @@ def test_the_velocities_of_people_who_turn_together_follow_the_turn(rate_hz):
         return [at(*place) for place in places(time_s) + random.normal(0, 0.03, (3, 2))]
     random, tracker = np.random.RandomState(0), Tracker()
     objects = play(tracker, 4.5, detections, rate_hz, view=CameraView(mounted(1), None))[-1]
-    assert len(objects) == 3 and tracker.common_motions <= 1
+    assert len(objects) == 3 and tracker.totals.common_motions <= 1
     for track in objects:
         np.testing.assert_allclose(track.velocity_mps[:2], (1.4, 0), atol=0.4)

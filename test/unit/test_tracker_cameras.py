@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.out_of_sequence import LATEST_NS, MOST_KEPT
@@ -271,7 +271,7 @@ def steps_m(published):
 def test_cameras_whose_poses_disagree_do_not_move_the_frame(rate_hz, offset_m):
     tracker = Tracker()
     published = play(tracker, group_images(4, rate_hz, offset_m))[rate_hz:]
-    assert not tracker.common_motions
+    assert not tracker.totals.common_motions
     assert all(ids(objects) == [1, 2, 3, 4] for objects in published)
     assert max(steps_m(published)) < 0.4 * np.linalg.norm(offset_m)
 

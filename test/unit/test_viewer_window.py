@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.sessions.snapshots import ColorImage, Snapshot

@@ -9,7 +9,7 @@ import rosbag
 from conftest import DATA
 from ros_3d_bb.bags.bag_writer import START_NS, session_images, session_to_bag, write_bag
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, camera_from_msg, time_from, tracks_from_msg
 from ros_3d_bb.core.time_sync import NS

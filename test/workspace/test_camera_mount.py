@@ -13,8 +13,7 @@ from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.bags.process_bag import _parser, _settings_from, main
 from ros_3d_bb.camera.camera_model import transform_from
-from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.camera.image_rotation import mounted_camera, turned_camera, turned_image, turned_rotation
+from ros_3d_bb.camera.images import DepthImage, mounted_camera, turned_camera, turned_image, turned_rotation
 from ros_3d_bb.conversions.camera_msgs import (DEPTH_TOPIC, INFO_TOPICS, START_NS, CameraFrame, image_messages_of,
                                                messages_of, transform_messages)
 from ros_3d_bb.conversions.image_msgs import fill_image

@@ -5,7 +5,7 @@ import pytest
 
 from ros_3d_bb.camera.alignment import frames_fault, intrinsics_fault
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.conversions.image_msgs import units_fault
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.diagnosis.checks import BOXES2D, BOXES3D, COLOR, DEPTH, INFO, TRACKS, findings

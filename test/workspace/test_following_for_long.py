@@ -6,7 +6,7 @@ from collections import namedtuple
 import numpy as np
 import pytest
 
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.planning.following import FollowParams, Follower

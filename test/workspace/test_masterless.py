@@ -8,8 +8,7 @@ from std_msgs.msg import Header
 from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.camera.image_rotation import mounted_camera
+from ros_3d_bb.camera.images import DepthImage, mounted_camera
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, TF_TOPIC, CameraFrame, messages_of
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg
 from ros_3d_bb.core.latest_worker import NewestWorker

@@ -13,7 +13,7 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 from std_srvs.srv import SetBoolRequest
 
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.nodes.bbox3d_node import SampleImages
 from ros_3d_bb.nodes.common import master, startup, subscribers
@@ -69,13 +69,14 @@ def test_3d_boxes_do_not_wait_for_a_master_to_subscribe_colour():
     with mock.patch('rospy.Publisher') as publisher, mock.patch('rospy.Subscriber') as subscriber, \
             mock.patch('ros_3d_bb.nodes.bbox3d_node.patient_master', side_effect=OSError('no route')) as query:
         publisher.return_value.get_num_connections.return_value = 1
-        diagnostics, depth = mock.MagicMock(), DepthImage(np.zeros((4, 4), np.uint16), 0.001)
+        diagnostics = mock.MagicMock()
+        frame = mock.Mock(received_depth=DepthImage(np.zeros((4, 4), np.uint16), 0.001))
         images = SampleImages(Bbox3dParams(), None, diagnostics)
-        images.publish(Header(), depth, [])
+        images.publish(Header(), frame, [])
         wait_until(lambda: diagnostics.warn.called, 'a warning')
         assert 'no route' in diagnostics.warn.call_args[0][1] and not subscriber.called
         query.side_effect = None
-        images.publish(Header(), depth, [])
+        images.publish(Header(), frame, [])
         wait_until(lambda: subscriber.called, 'a subscription')
 
 

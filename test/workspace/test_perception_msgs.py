@@ -7,7 +7,7 @@ from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 
 from fuzz.hostile import transforms as transforms_at
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.conversions.camera_msgs import CameraFrame, info_of_images, info_topic_beside, messages_of
 from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, boxes2d_to_msg, boxes3d_to_msg,
                                                    camera_from_msg, stamp_of, time_from, tracks_from_msg,

@@ -7,7 +7,7 @@ from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.bags.process_bag import main, with_params
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.conversions.camera_msgs import (DEPTH_TOPICS, START_NS, STATIC_TOPIC, CameraFrame, image_messages_of,
                                                transform_messages)
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg, time_from

@@ -10,7 +10,7 @@ from tf2_msgs.msg import TFMessage
 from ros_3d_bb.bags.bag_reader import BagError, BagReader, Raw, message_in
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.bags.bag_writer import new_bag
-from ros_3d_bb.camera.image_rotation import mounted_camera, turns_for
+from ros_3d_bb.camera.images import mounted_camera, turns_for
 from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, IMAGE_KINDS, RAW, STATIC_TOPIC, TF_TOPIC,
                                                absolute, info_of_images)
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC

@@ -4,7 +4,7 @@ Each returns a description of the fault, empty without one. `color` and `depth` 
 """
 import numpy as np
 
-from ros_3d_bb.camera.depth_image import FARTHEST_M
+from ros_3d_bb.camera.images import FARTHEST_M
 
 SAME_PX = 1.0  # intrinsics that differ by less count as equal: half a pixel is 1 cm at 6 m
 ALIGN = ('start the camera with realsense.launch, or realsense2_camera with align_depth:=true, and use '

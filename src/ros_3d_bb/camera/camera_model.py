@@ -10,7 +10,6 @@ import numpy as np
 
 from ros_3d_bb.camera.distortion import checked_distortion, distort, undistort
 
-STEEP = 0.34  # sine of the angle between the optical axis and the vertical: 20 degrees
 OPTICAL_ROTATION = (-0.5, 0.5, -0.5, 0.5)  # quaternion of an optical frame whose z axis is the body's x axis (REP 103)
 
 
@@ -101,25 +100,6 @@ def quaternion_from(matrix):
     row = products[int(np.argmax(squares))]
     quaternion = row / np.linalg.norm(row)
     return quaternion if quaternion[3] >= 0 else -quaternion
-
-
-def upright_turns(fixed_from_camera):
-    """`quarter_turns` of a camera by its pose `fixed_from_camera` (4, 4) in a frame whose z axis points up."""
-    return quarter_turns(fixed_from_camera[2, :3])
-
-
-def quarter_turns(up):
-    """Number of clockwise quarter turns after which the image is upright; `up` (3,) is in the optical frame.
-
-    0 for an upright camera, 1 if the left edge of the image is up, 2 if the camera is upside down, 3 if the right edge
-    is up. Also 0 for a camera that points up or down within `STEEP`: people have no upright direction in its image.
-    """
-    x_up, y_up = up[:2]
-    if np.hypot(x_up, y_up) < STEEP:
-        return 0
-    if abs(x_up) > abs(y_up):
-        return 3 if x_up > 0 else 1
-    return 2 if y_up > 0 else 0
 
 
 def transform_points(b_from_a, points):

@@ -7,7 +7,7 @@ samples in a box need a few thousand points, the whole image hundreds of thousan
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.camera.depth_image import FARTHEST_M
+from ros_3d_bb.camera.images import FARTHEST_M
 
 NEAREST_M = 0.4  # lower bound of the depth of people, for the part of the depth image that is registered
 BORDER_AT_M = 2.0  # depth at which the border of the depth image is projected; people are cut at about this distance
@@ -87,7 +87,7 @@ class Registration(object):
 
 
 class RegisteredDepth(object):
-    """A raw depth image as the colour camera sees it. Has the interface of `depth_image.DepthImage`, in metres."""
+    """A raw depth image as the colour camera sees it. Has the interface of `images.DepthImage`, in metres."""
 
     scale_m = 1.0
 

@@ -6,7 +6,7 @@ OpenCV is imported only where it is used, see `camera.distortion`.
 """
 import numpy as np
 
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.conversions.compressed_images import decode
 
 # encoding: (dtype without byte order, channels)
@@ -56,7 +56,7 @@ def pixels_from(message, encodings=tuple(LAYOUTS), content='supported'):
     Raises ValueError as `array_from`, if a compressed image cannot be decoded, or if the encoding is not one of
     `encodings`, those of the expected `content`.
     """
-    if not is_compressed(message):
+    if not hasattr(message, 'format'):  # not a sensor_msgs/CompressedImage
         if message.encoding not in encodings:
             raise ValueError('%s image has encoding %r; expected one of %s'
                              % (content, message.encoding, ', '.join(encodings)))
@@ -69,11 +69,6 @@ def pixels_from(message, encodings=tuple(LAYOUTS), content='supported'):
     if encoding not in encodings:
         raise ValueError('%s has encoding %.20r; a %s image expected' % (name, encoding, content))
     return pixels, encoding
-
-
-def is_compressed(message):
-    """Whether an image message is a sensor_msgs/CompressedImage."""
-    return hasattr(message, 'format')
 
 
 def imgmsg_to_rgb(message):

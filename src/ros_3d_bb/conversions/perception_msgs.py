@@ -11,9 +11,8 @@ from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 
 from ros_3d_bb import msg
 from ros_3d_bb.camera.camera_model import Camera, transform_from
-from ros_3d_bb.core.labels import PERSON, label_fault, score_fault, usable_label
+from ros_3d_bb.core.object_classes import MAX_COORDINATE_M, MAX_SIZE_M, PERSON, label_fault, score_fault, usable_label
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.core.valid_ranges import MAX_COORDINATE_M, MAX_SIZE_M
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.tracking.types import TrackedObject
@@ -83,8 +82,8 @@ def boxes2d_to_msg(boxes, header, labels=None, scores=None, image_size=None):
 
     `boxes` (n, 4) are x1, y1, x2, y2 in pixels, which are rounded to integers; `header` is that of the image. `labels`
     are the class names of the boxes, and `scores` are 0..1; both follow in the layout if they are given. Characters of
-    class names that the layout cannot carry are replaced (`labels.usable_label`). The (width, height) of the image
-    shows whether it has the size of the camera_info.
+    class names that the layout cannot carry are replaced (`usable_label`). The (width, height) of the image shows
+    whether it has the size of the camera_info.
     """
     message = Int32MultiArray(data=np.rint(boxes).astype(int).ravel().tolist())
     label = 'boxes;stamp=%d.%09d;frame=%s' % (header.stamp.secs, header.stamp.nsecs, header.frame_id)
@@ -213,7 +212,8 @@ def boxes3d_to_msg(boxes, header, camera):
         message = BoundingBox3D(label=box.label, score=score, support=support, truncated=any(box.truncated_edges))
         for flag, is_cut in zip(EDGE_FLAGS, box.truncated_edges):
             message.truncated_edges |= flag if is_cut else 0
-        _set_position(message.center, box.center_m.tolist())
+        _set_xyz(message.center.position, box.center_m.tolist())
+        message.center.orientation.w = 1.0
         _set_xyz(message.size, box.size_m.tolist())
         if box.covariance_m2 is not None:
             message.position_covariance = np.ravel(box.covariance_m2).tolist()
@@ -297,7 +297,8 @@ def _track_to_msg(track):
                                 prediction_step=genpy.Duration.from_sec(track.prediction_step_s))
     _set_xyz(message.size, track.size_m.tolist())
     _set_xyz(message.twist.twist.linear, track.velocity_mps.tolist())
-    _set_position(message.pose.pose, track.position_m.tolist())
+    _set_xyz(message.pose.pose.position, track.position_m.tolist())
+    message.pose.pose.orientation.w = 1.0
     for position_m in track.prediction_m.tolist():
         pose = PoseWithCovariance()
         point, pose.pose.orientation.w = pose.pose.position, 1.0
@@ -345,12 +346,6 @@ def _track_from_msg(track):
 
 def _covariance_3x3(with_covariance):
     return np.reshape(with_covariance.covariance, (6, 6))[:3, :3]
-
-
-def _set_position(pose, position_m):
-    """Set the position of a geometry_msgs/Pose that is not rotated."""
-    _set_xyz(pose.position, position_m)
-    pose.orientation.w = 1.0
 
 
 def _set_xyz(message, values):

@@ -9,7 +9,7 @@ from nav_msgs.msg import MapMetaData, OccupancyGrid
 from sensor_msgs.msg import PointCloud2, PointField
 
 from ros_3d_bb.conversions.perception_msgs import tracks_to_msg
-from ros_3d_bb.core.labels import COCO
+from ros_3d_bb.core.object_classes import COCO
 from ros_3d_bb.msg import TrackedObject
 
 STATUS_NAMES = {TrackedObject.VISIBLE: 'visible', TrackedObject.OCCLUDED: 'occluded',

@@ -1,15 +1,27 @@
-"""Classes of objects: usual sizes, motion, and groups of classes that detectors confuse. See config/classes.yaml."""
+"""Classes of objects: names, usual sizes, motion, and groups that detectors confuse. See config/classes.yaml."""
+import re
 from collections import OrderedDict
 from typing import NamedTuple, Optional
 
 import numpy as np
 import yaml
 
-from ros_3d_bb.core.labels import PEOPLE, PERSON, label_fault
 from ros_3d_bb.core.params import nearest_name
-from ros_3d_bb.core.valid_ranges import MAX_SIZE_M
 from ros_3d_bb.core.yaml_loader import load_yaml
 
+PERSON = 'person'  # class of objects whose class is not given
+PEOPLE = PERSON, 'people', 'pedestrian', 'human'  # names of this class in data sets, in lower case
+# Classes of the COCO data set by number, as YOLO and most other detectors name them (80 of the 91 of Lin et al., 2014).
+COCO = (
+    'person,bicycle,car,motorcycle,airplane,bus,train,truck,boat,traffic light,fire hydrant,stop sign,parking meter,'
+    'bench,bird,cat,dog,horse,sheep,cow,elephant,bear,zebra,giraffe,backpack,umbrella,handbag,tie,suitcase,frisbee,'
+    'skis,snowboard,sports ball,kite,baseball bat,baseball glove,skateboard,surfboard,tennis racket,bottle,wine glass,'
+    'cup,fork,knife,spoon,bowl,banana,apple,sandwich,orange,broccoli,carrot,hot dog,pizza,donut,cake,chair,couch,'
+    'potted plant,bed,dining table,toilet,tv,laptop,mouse,remote,keyboard,cell phone,microwave,oven,toaster,sink,'
+    'refrigerator,book,clock,vase,scissors,teddy bear,hair drier,toothbrush').split(',')
+MAX_LENGTH = 64  # characters of a name
+UNUSABLE = re.compile(r'[^ -~]|[;,]')  # separators of names in an array of 2D boxes, and all but printable ASCII
+MAX_SIZE_M, MAX_COORDINATE_M = 10.0, 1e8  # of boxes; chosen: objects and maps of no robot are larger
 MAX_CLASSES, MAX_IN_GROUP = 200, 8
 LARGEST_FACTOR = 100.0
 TALLEST_PERSON = 1.6  # relative to the usual height; chosen: a tall person with raised arms
@@ -149,3 +161,26 @@ def _class_from(name, entry):
         elif isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value <= RANGES[key]:
             raise ValueError('%s.%s is %.80r; a number from 0 to %g expected' % (name, key, value, RANGES[key]))
     return ObjectClass(**{key: value if key == 'group' else float(value) for key, value in entry.items()})
+
+
+def usable_label(name):
+    """Replace the characters of a class name that messages cannot carry by underscores, and shorten a long name."""
+    return UNUSABLE.sub('_', str(name).strip())[:MAX_LENGTH] or '_'
+
+
+def described(label, text):
+    """A short text about an object, after its class unless it is a person."""
+    return text if label == PERSON else '%s %s' % (label, text)
+
+
+def label_fault(name):
+    """Description of what is wrong with a class name from a message; empty if it can be used."""
+    if name and len(name) <= MAX_LENGTH and not UNUSABLE.search(name):
+        return ''
+    return ('the class name %.80s; 1 to %d printable ASCII characters without ; and , expected'
+            % (ascii(name), MAX_LENGTH))
+
+
+def score_fault(score):
+    """Description of what is wrong with a score from a message; empty if it can be used. 0 means unknown."""
+    return '' if 0 <= score <= 1 else 'the score %g; 0..1 expected' % score

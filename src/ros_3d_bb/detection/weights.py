@@ -1,5 +1,5 @@
 """What model files of all formats share: the error of unusable files, and class names."""
-from ros_3d_bb.core.labels import COCO
+from ros_3d_bb.core.object_classes import COCO
 
 MAX_CLASSES, MAX_NAME = 10000, 200
 

@@ -3,7 +3,7 @@ from typing import NamedTuple, Optional
 
 import numpy as np
 
-from ros_3d_bb.camera.image_rotation import turned_camera, turned_depth, turned_image
+from ros_3d_bb.camera.images import turned_camera, turned_depth, turned_image
 from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.depth.ground_plane import CameraPose, camera_pose_above, fit_floor
 

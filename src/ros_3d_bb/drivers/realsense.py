@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
-from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.camera.distortion import EQUIDISTANT, INVERSE_BROWN_CONRADY, PLUMB_BOB
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.core.time_sync import NS
 

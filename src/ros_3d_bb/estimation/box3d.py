@@ -9,8 +9,7 @@ from typing import Any, NamedTuple, Optional, Tuple
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.core.labels import PERSON
-from ros_3d_bb.core.valid_ranges import MAX_COORDINATE_M, MAX_SIZE_M
+from ros_3d_bb.core.object_classes import MAX_COORDINATE_M, MAX_SIZE_M, PERSON
 
 # A box whose edge is this close to the image border, in pixels plus a share of its extent, counts as truncated. Chosen:
 # detectors regress the edge of a truncated person up to 8 pixels inside the image, farther for larger boxes. A person
@@ -18,7 +17,6 @@ from ros_3d_bb.core.valid_ranges import MAX_COORDINATE_M, MAX_SIZE_M
 BORDER_PX, BORDER_SHARE = 4, 0.02
 LEVEL = np.eye(3)  # of a camera that is held level
 LEVEL_AXES = tuple(map(tuple, LEVEL.tolist()))
-LEAST_AHEAD = 0.05  # lower bound of the horizontal part of a ray; chosen
 
 
 class ImageGeometry(NamedTuple):
@@ -82,23 +80,6 @@ def truncated_edges(rect_px, area_px):
     across_px, down_px = BORDER_PX + BORDER_SHARE * (x2 - x1), BORDER_PX + BORDER_SHARE * (y2 - y1)
     return (bool(x1 <= left + across_px), bool(y1 <= top + down_px), bool(x2 >= right - across_px),
             bool(y2 >= bottom - down_px))
-
-
-def complete_truncated_extent(low, high, cut_low, cut_high, usual):
-    """Extend low..high of a body that the image border truncates at one end to at least the usual extent."""
-    missing = max(0.0, usual - (high - low))
-    if cut_low and not cut_high:
-        return low - missing, high
-    return low, high + (missing if cut_high and not cut_low else 0.0)
-
-
-def slopes_down(flat_px, geometry):
-    """y / z in the level frame of the rays through the middles of the upper and of the lower edge of a rectangle."""
-    camera, (x1, y1, x2, y2) = geometry.camera, flat_px
-    _across, (down_x, down_y, down_z), (ahead_x, ahead_y, ahead_z) = geometry.level_axes
-    x = ((x1 + x2) / 2.0 - camera.cx) / camera.fx
-    return [(down_x * x + down_y * y + down_z) / max(ahead_x * x + ahead_y * y + ahead_z, LEAST_AHEAD)
-            for y in ((y1 - camera.cy) / camera.fy, (y2 - camera.cy) / camera.fy)]
 
 
 def without_distortion(rects_px, camera):

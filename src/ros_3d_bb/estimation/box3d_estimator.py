@@ -1,18 +1,33 @@
-"""3D box estimators: from rectangles in the depth image to 3D boxes. See `box3d` for the conventions."""
+"""3D box estimators: from rectangles in the depth image to 3D boxes. See `box3d` for the conventions.
+
+Of the estimator foreground, the order of the objects and their masks are in `overlaps`, the layers in `depth_samples`.
+"""
 import functools
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.camera.depth_image import FARTHEST_M
-from ros_3d_bb.core.labels import PERSON
-from ros_3d_bb.core.object_classes import ObjectClasses
+from ros_3d_bb.camera.images import FARTHEST_M
+from ros_3d_bb.core.object_classes import PERSON, ObjectClasses
 from ros_3d_bb.estimation.box3d import LEVEL, Box3D, ImageGeometry, truncated_edges, without_distortion
-from ros_3d_bb.estimation.depth_samples import BODY_HALF_DEPTH_MM, grid_in
-from ros_3d_bb.estimation.foreground import estimate_foreground
+from ros_3d_bb.estimation.depth_samples import (BESIDE_TRUNK_M, BODY_HALF_DEPTH_MM, FEET_M, LEAST_SIZE, LOOKS_DOWN,
+                                                RectSamples, camera_rays, grid_in)
+from ros_3d_bb.estimation.median import centred_grid, estimate_median
+from ros_3d_bb.estimation.overlaps import Overlaps
 
 # A camera with more tilt or roll does not show people upright; chosen.
 MAX_TILT_RAD, MAX_ROLL_RAD = np.radians(65), np.radians(45)
+LEAST_MEASURED = 0.02  # minimum share of the samples with depth for an estimate; chosen: a lidar gives twice as many
+# Minimum share of the weight of all samples in the layer for an estimate. Chosen: what a depth camera measures beside a
+# person who is too near for it has at most 0.014 in the approach scenes.
+LEAST_SHARE = 0.02
+FEW = 0.2  # share of the samples from which on a layer has more than `LEAST_SHARE` of the weight, wherever it is
+LEAST_SUPPORT = 0.1  # minimum share of the samples with depth in the layer for an estimate; chosen
+TALL_M, ARMS_ABOVE_M = 1.8, 0.04  # chosen: people who appear taller may raise their arms so far above their heads
+LEAST_WIDTH_M = 0.05  # chosen: of a body that is one pixel wide
+BENT_M = 0.15  # chosen: before a level camera, the ends of people who walk are at most this far from their layer
+LEAST_AHEAD = 0.05  # lower bound of the horizontal part of a ray; chosen
 
 
 class Samples(NamedTuple):
@@ -31,55 +46,13 @@ class Samples(NamedTuple):
         return np.stack(np.meshgrid(self.columns, self.rows), axis=-1)
 
 
-def sample_depth(depth, rect_px, stride_px):
-    """Samples of a DepthImage in a rectangle, on a centred grid of every `stride_px` pixels, clipped to the image
-    (thesis 3.4.2). There are none in an empty or reversed rectangle.
-    """
+def sample_depth(depth, rect_px, grid):
+    """Samples of a DepthImage in a rectangle, at the rows and columns (slices) of `grid(rect_px, shape)`."""
     height, width = depth.shape
-    x1, y1, x2, y2 = map(int, rect_px)
-    return _samples_at(depth, _ticks(y1, y2, height, stride_px), _ticks(x1, x2, width, stride_px))
-
-
-def sample_grid(depth, rect_px):
-    """Samples of a DepthImage in the visible part of a rectangle, on the grid of the foreground estimator."""
-    return _samples_at(depth, *grid_in(tuple(map(int, rect_px)), depth.shape))
-
-
-def _samples_at(depth, rows, columns):
-    """Samples in rows and columns (slices)."""
-    height, width = depth.shape
+    rows, columns = grid(tuple(map(int, rect_px)), (height, width))
     depth_m = depth.part(rows, columns).astype(float) * depth.scale_m
     valid = (depth_m > 0) & (depth_m <= FARTHEST_M)
     return Samples(np.arange(width)[columns], np.arange(height)[rows], depth_m, valid)
-
-
-def _ticks(low, high, limit, stride):
-    """Slice of positions `stride` apart, centred in low..high and clipped to 0..limit; exact for ints of any size."""
-    count = -(-(high - low) // stride)
-    first = low + (high - low - (count - 1) * stride - 1) // 2
-    first += max(0, -(first // stride)) * stride
-    return slice(first, max(first, min(high, limit)), stride) if first < limit else slice(0, 0)
-
-
-def estimate_median(samples, rect_px, geometry):
-    """Estimate a box as in the thesis (3.4.2): per-axis median of the sampled points, size from the box at that depth.
-
-    Returns a Box3D, or None without a valid depth or if the rectangle cannot be undistorted. The tilt of the camera is
-    ignored.
-    """
-    camera = geometry.camera
-    across, down = camera.rays(samples.columns, samples.rows[:, np.newaxis])
-    seen = samples.valid & ~np.isnan(across)  # the distortion model does not define a ray for every pixel
-    (flat_px,) = without_distortion([rect_px], camera)
-    if not (np.isfinite(flat_px).all() and seen.any()):
-        return None
-    points = np.stack((across * samples.depth_m, down * samples.depth_m, samples.depth_m), axis=-1)[seen]
-    x1, y1, x2, y2 = flat_px
-    center_m = np.median(points, axis=0)
-    width_m, height_m = (x2 - x1) / camera.fx * center_m[2], (y2 - y1) / camera.fy * center_m[2]
-    on_body = np.abs(samples.depth_m[samples.valid] - center_m[2]) <= BODY_HALF_DEPTH_MM / 1000.0
-    return Box3D(center_m, np.array([width_m, height_m, width_m]), tuple(rect_px), on_body.mean(),
-                 truncated_edges(rect_px, geometry.area_px))
 
 
 class Estimator(NamedTuple):
@@ -101,9 +74,9 @@ def estimator_named(name, stride_px=20, classes=ObjectClasses()):
     if stride_px < 1:
         raise ValueError('stride is %d; at least 1 expected' % stride_px)
     if name == 'foreground':
-        return Estimator(sample_grid, estimate_foreground, classes)
+        return Estimator(functools.partial(sample_depth, grid=grid_in), estimate_foreground, classes)
     if name == 'median':
-        sample = functools.partial(sample_depth, stride_px=stride_px)
+        sample = functools.partial(sample_depth, grid=functools.partial(centred_grid, stride_px=stride_px))
 
         def estimate(depth, rects_px, geometry, _kinds):
             return [estimate_median(sample(depth, rect_px), rect_px, geometry) for rect_px in rects_px]
@@ -116,7 +89,7 @@ def estimate_boxes(depth, rects_px, camera, estimator, level_from_camera=LEVEL, 
 
     Parameters
     ----------
-    depth : depth_image.DepthImage
+    depth : images.DepthImage
     rects_px : list of (x1, y1, x2, y2)
     camera : camera_model.Camera
     estimator : Estimator
@@ -140,13 +113,6 @@ def estimate_boxes(depth, rects_px, camera, estimator, level_from_camera=LEVEL, 
     return [box and (box if label == box.label else box._replace(label=label)) for box, label in zip(boxes, labels)]
 
 
-def check_rect(rect_px):
-    """Raise ValueError if a rectangle is empty or reversed."""
-    x1, y1, x2, y2 = rect_px
-    if x1 >= x2 or y1 >= y2:
-        raise ValueError('box (%d, %d, %d, %d) is empty or reversed: x1 < x2 and y1 < y2 expected' % (x1, y1, x2, y2))
-
-
 def level_rotation(up):
     """Rotation (3, 3) from the optical frame to the level frame, given the unit vector `up` (3,) in the optical frame.
 
@@ -161,3 +127,153 @@ def level_rotation(up):
     ahead = np.array([0.0, 0.0, 1.0]) - down[2] * down
     ahead /= np.linalg.norm(ahead)
     return np.stack((np.cross(down, ahead), down, ahead))
+
+
+def estimate_foreground(depth, rects_px, geometry, kinds):
+    """Estimate a box from the depth layer of the object in each rectangle of an image: the nearest layer that is
+    dominant near the middle of the rectangle. Furniture in front of a person, or what the person carries, is lower than
+    people are, and does not reach the upper edge: what does is the person.
+
+    Background beside and between the limbs may fill most of a rectangle, but it is farther away. Around a person it
+    fills the outline of the rectangle, too, as furniture and other people at the sides do. Flying pixels are too sparse
+    to form a layer. The position is that of the vertical axis of the object: laterally halfway between the edges of the
+    layer, for people near the middle of the trunk, and behind its mean depth by the distance of its class. The ends of
+    a person who bends are at their own distances: the head is nearer than the feet, or farther. The height of people
+    does not include raised arms. If the image border truncates the object, it is completed to the usual size of its
+    class. All of this is done in the level frame.
+
+    In the rectangles of nearer objects with plausible boxes, pixels that are not behind them are masked. Rectangles are
+    therefore estimated in groups, each after those in front of it. Of several rectangles of one object, only the
+    largest gets a box: what remains in the others is background, which continues beyond their left and right sides.
+
+    `depth` is a DepthImage, `geometry` its ImageGeometry, and `kinds` are the ObjectClasses of the rectangles.
+
+    Returns
+    -------
+    list of Box3D or None
+        None if less than `LEAST_MEASURED` of the samples have a valid depth and a viewing ray, if the layer contains
+        less than `LEAST_SUPPORT` of those with depth, or less than `LEAST_SHARE` of all, weighted, if the rectangle
+        cannot be undistorted, or if it is a second one of the same object.
+    """
+    rects_px = list(map(tuple, rects_px))
+    flat_px = without_distortion(rects_px, geometry.camera)
+    rays = camera_rays(geometry.camera)
+    samples, truncated, usable, boxes = [], [], [], [None] * len(rects_px)
+    with np.errstate(invalid='ignore'):  # nan: the distortion model has no ray for every pixel
+        for number, rect_px in enumerate(rects_px):
+            truncated.append(truncated_edges(rect_px, geometry.area_px))
+            surrounded, least_m = _expected(kinds[number], truncated[number])
+            samples.append(RectSamples(depth, rect_px, rays, geometry.level_axes, surrounded, least_m))
+            rows, columns = samples[number].shape
+            has_depth = samples[number].measured >= max(LEAST_MEASURED * rows * columns, 1)
+            if has_depth and math.isfinite(sum(flat_px[number])):
+                usable.append(number)
+    overlaps = Overlaps(samples, usable, geometry.camera, kinds, truncated)
+    while overlaps.pending:
+        for number in overlaps.take_foremost():
+            seen = _visible_extents(samples[number], flat_px[number], geometry, number in overlaps.repeats)
+            if seen is None:
+                continue
+            box, axis_m = _box(seen, rects_px[number], truncated[number], kinds[number], geometry)
+            if box.is_plausible:
+                overlaps.mask_behind(number, int(1000 * axis_m) + BODY_HALF_DEPTH_MM)
+            boxes[number] = box
+    return boxes
+
+
+def _expected(kind, truncated):
+    """What is expected of the rectangle of an ObjectClass: whether its left, upper and right edge show mainly what
+    surrounds the object, and the least height of the object, metres; 0 if it is unknown.
+
+    Below people is the floor, or what hides their legs. Other objects may be as rectangular as a chair. Where the image
+    border truncates a person, an edge shows the person; at the left or the right, it is not known what surrounds them.
+    """
+    if kind.group != PERSON:
+        return (False, False, False), 0.0
+    cut_left, cut_top, cut_right, _cut_bottom = truncated
+    least_m = 0.0 if cut_left or cut_right else LEAST_SIZE * kind.height
+    return (not cut_left, not cut_top, not cut_right), least_m
+
+
+class _Extents(NamedTuple):
+    """Left, right, upper and lower end of what is visible of an object, the middle of its trunk, and its distance,
+    metres; its support.
+    """
+
+    left_m: float
+    right_m: float
+    trunk_m: float
+    top_m: float
+    bottom_m: float
+    layer_m: float
+    support: float
+
+
+def _visible_extents(samples, flat_px, geometry, may_repeat):
+    """The _Extents of the object in a rectangle; None without an object of its own.
+
+    `may_repeat` is whether it may be the background of another object.
+    """
+    layer = samples.layer()
+    count = layer.end - layer.first
+    support = count / samples.measured
+    if support < LEAST_SUPPORT:
+        return None
+    on_body = samples.on_body(layer)
+    if count < FEW * on_body.size and samples.share(on_body) < LEAST_SHARE:
+        return None
+    if may_repeat and samples.fill_sides(on_body):
+        return None
+    # The mean without the nearest and the farthest tenth is finer than the median, which has the depth resolution.
+    layer_m = layer.mean_mm(layer.first + count // 10, layer.end - count // 10) / 1000
+    upper, lower = slopes_down(flat_px, geometry)
+    looks_down = geometry.level_axes[1][2] > LOOKS_DOWN
+    # Before a level camera, the distances of the ends hardly matter unless the person bends; the mean is less noisy.
+    upper_m, lower_m = [end_m if looks_down or abs(end_m - layer_m) > BENT_M else layer_m
+                        for end_m in samples.ends(on_body)]
+    top_m, bottom_m = upper_m * upper, lower_m * lower
+    left_m, right_m, trunk_m = samples.edges(on_body, bottom_m - FEET_M if looks_down else None)
+    if bottom_m - top_m > TALL_M:
+        left_px, top_px, right_px, bottom_px = flat_px
+        head_px = left_px, top_px + samples.pixels_above_head(on_body, trunk_m, layer_m), right_px, bottom_px
+        head_m = layer_m * slopes_down(head_px, geometry)[0]
+        top_m = head_m if head_m - top_m > ARMS_ABOVE_M else top_m
+    return _Extents(left_m, right_m, trunk_m, top_m, bottom_m, layer_m, support)
+
+
+def _box(seen, rect_px, truncated, kind, geometry):
+    """The Box3D of an object, completed where the image border truncates it, and the distance of its axis, metres.
+
+    `seen` are its _Extents, and `kind` is its ObjectClass.
+    """
+    left_m, right_m, trunk_m, top_m, bottom_m, layer_m, support = seen
+    cut_left, cut_top, cut_right, cut_bottom = truncated
+    left_m, right_m = complete_truncated_extent(left_m, right_m, cut_left, cut_right, kind.width)
+    top_m, bottom_m = complete_truncated_extent(top_m, bottom_m, cut_top, cut_bottom, kind.height)
+    middle_m = (left_m + right_m) / 2
+    if kind.group == PERSON and (left_m, right_m) == seen[:2]:
+        middle_m = min(max(middle_m, trunk_m - BESIDE_TRUNK_M), trunk_m + BESIDE_TRUNK_M)
+    width_m = max(right_m - left_m, LEAST_WIDTH_M)
+    axis_m = layer_m + kind.axis_behind(width_m)
+    along_ray = axis_m / layer_m
+    across_m, down_m = middle_m * along_ray, (top_m + bottom_m) / 2
+    center_m = [x * across_m + y * down_m + z * axis_m for x, y, z in zip(*geometry.level_axes)]
+    size_m = np.array((width_m, bottom_m - top_m, width_m))
+    return Box3D(np.array(center_m), size_m, rect_px, support, truncated, largest_m=kind.largest_m), axis_m
+
+
+def complete_truncated_extent(low, high, cut_low, cut_high, usual):
+    """Extend low..high of a body that the image border truncates at one end to at least the usual extent."""
+    missing = max(0.0, usual - (high - low))
+    if cut_low and not cut_high:
+        return low - missing, high
+    return low, high + (missing if cut_high and not cut_low else 0.0)
+
+
+def slopes_down(flat_px, geometry):
+    """y / z in the level frame of the rays through the middles of the upper and of the lower edge of a rectangle."""
+    camera, (x1, y1, x2, y2) = geometry.camera, flat_px
+    _across, (down_x, down_y, down_z), (ahead_x, ahead_y, ahead_z) = geometry.level_axes
+    x = ((x1 + x2) / 2.0 - camera.cx) / camera.fx
+    return [(down_x * x + down_y * y + down_z) / max(ahead_x * x + ahead_y * y + ahead_z, LEAST_AHEAD)
+            for y in ((y1 - camera.cy) / camera.fy, (y2 - camera.cy) / camera.fy)]

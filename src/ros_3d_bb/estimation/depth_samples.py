@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.camera.depth_image import FARTHEST_M
+from ros_3d_bb.camera.images import FARTHEST_M
 
 # Largest numbers of rows and columns; on average, two thirds of them are sampled. Measured: positions are as accurate
 # as with 2000 to 8000 samples (./run bench accuracy).

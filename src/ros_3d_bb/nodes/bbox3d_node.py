@@ -9,8 +9,8 @@ from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, INFO_TO
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, boxes3d_to_msg, camera_from_msg,
                                                    header_of, stamp_of)
-from ros_3d_bb.core.labels import described
 from ros_3d_bb.core.latest_worker import NewestWorker
+from ros_3d_bb.core.object_classes import described
 from ros_3d_bb.core.time_sync import NS, MessageCache, arrival_clock_ns
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
@@ -77,7 +77,7 @@ class Bbox3dNode(object):
             self._diagnostics.record_latency(message.header.stamp)
             if self._next_stage is not None:
                 self._next_stage(message)
-            self._images.publish(message.header, frame.received_depth, boxes3d)
+            self._images.publish(message.header, frame, boxes3d)
 
 
 class DepthCameraCheck(object):
@@ -153,12 +153,16 @@ class SampleImages(object):
         # In a separate thread, because an unresponsive master must not block the 3D boxes.
         self._subscription = NewestWorker(self._subscribe, self._on_error)
 
-    def publish(self, header, depth, boxes):
-        """Publish the debug images of one set of 3D boxes on the topics that have subscribers."""
+    def publish(self, header, frame, boxes):
+        """Publish the debug images of the 3D boxes of an RgbdFrame on the topics that have subscribers."""
         needs_raw, needs_color = self._raw_pub.get_num_connections() > 0, self._color_pub.get_num_connections() > 0
+        needs_depth = self._depth_pub.get_num_connections() > 0
         if (needs_raw or needs_color) != (self._unsubscribe is not None):
             self._subscription.offer(needs_raw or needs_color)
-        if self._depth_pub.get_num_connections():
+        if not (needs_raw or needs_color or needs_depth):
+            return
+        depth = frame.received_depth
+        if needs_depth:
             grey = depth_to_grey(depth, self.depth_range_m)
             self._depth_pub.publish(fill_image(Image(header=header), grey, 'mono8'))
         color = self._colors.nearest(header.stamp.to_nsec())

@@ -1,5 +1,5 @@
 """Pose of a camera that tf does not contain, from the floor in its depth images."""
-from ros_3d_bb.camera.image_rotation import mounted_camera, turned_camera, turned_depth, turns_for
+from ros_3d_bb.camera.images import mounted_camera, turned_camera, turned_depth, turns_for
 from ros_3d_bb.conversions.camera_msgs import RAW
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
 from ros_3d_bb.conversions.perception_msgs import camera_from_msg, stamp_of

@@ -4,7 +4,7 @@ from typing import NamedTuple
 import tf2_ros
 
 from ros_3d_bb.camera.camera_model import transform_from
-from ros_3d_bb.camera.image_rotation import AUTO, turned_boxes, turned_image, turns_for
+from ros_3d_bb.camera.images import AUTO, turned_boxes, turned_image, turns_for
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import NEWEST, stamp_of
 from ros_3d_bb.core.params import (DEPTH, DEPTH_SCALE, ENABLED, IMAGE_ROTATION, PUBLISH_EMPTY, STAMP_TOLERANCE, Param,

@@ -1,18 +1,26 @@
 """Estimation stage: 3D boxes from frames and 2D boxes, shared by bbox3d_node and the pipeline in one process."""
 import functools
+import itertools
+from collections import deque
 from typing import NamedTuple
 
 import numpy as np
 
-from ros_3d_bb.camera.image_rotation import turned_rotation
-from ros_3d_bb.core.object_classes import read_object_classes
+from ros_3d_bb.camera.images import turned_rotation
+from ros_3d_bb.core.object_classes import PERSON, PERSON_CLASS, read_object_classes
 from ros_3d_bb.core.params import (CLASSES_FILE, DEPTH, DEPTH_SCALE, IMAGE_ROTATION, LARGEST, STAMP_TOLERANCE, Param,
                                    parameters)
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.box3d_estimator import check_rect, estimate_boxes, estimator_named, level_rotation
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, error_model_of_param
-from ros_3d_bb.estimation.scale_check import ScaleCheck
 
+# Check of the scale of depth images.
+LATEST = 20  # people that must agree
+LEAST_SUPPORT = 0.3  # boxes with less are often those of other objects
+LEAST_ASPECT = 2.5  # height / width of the 2D box of a person who stands; less for seated or hidden people
+HEIGHTS_M = (0.8, 2.4)  # plausible: a child below a camera whose tilt of 45 degrees is unknown, and a tall adult
+COMMON_FACTORS = np.array([0.001, 0.01, 0.1, 0.2, 5, 10, 100, 1000])  # 0.2: 5000 units per metre, as in TUM RGB-D
+NEAR = 1.4  # ratio of a factor and a common one that it stands for
 # A camera that is fixed to the robot has the same tilt in each image.
 _level_rotation = functools.lru_cache(maxsize=16)(level_rotation)
 
@@ -107,15 +115,13 @@ class EstimationStage(object):
 
     def _usable_boxes(self, boxes2d):
         """Return the Boxes2D whose rectangles are neither empty nor reversed."""
-        usable = []
-        for number, rect_px in enumerate(boxes2d.boxes.tolist()):
-            try:
-                check_rect(rect_px)
-                usable.append(number)
-            except ValueError as error:
-                self._events.warn('boxes rejected', '2D %s; the others in this image are used' % error)
-        return boxes2d._replace(boxes=boxes2d.boxes[usable], labels=[boxes2d.labels[number] for number in usable],
-                                scores=boxes2d.scores[usable])
+        boxes = boxes2d.boxes
+        is_usable = (boxes[:, 0] < boxes[:, 2]) & (boxes[:, 1] < boxes[:, 3])
+        for rect_px in boxes[~is_usable].tolist():
+            self._events.warn('boxes rejected', '2D box (%d, %d, %d, %d) is empty or reversed: x1 < x2 and y1 < y2 '
+                              'expected; the others in this image are used' % tuple(rect_px))
+        return boxes2d._replace(boxes=boxes[is_usable], labels=list(itertools.compress(boxes2d.labels, is_usable)),
+                                scores=boxes2d.scores[is_usable])
 
 
 def _as_received(box, frame):
@@ -130,3 +136,40 @@ def _as_received(box, frame):
     return box._replace(center_m=received_from_upright.dot(box.center_m), size_m=size_m, rect_px=tuple(rect_px),
                         truncated_edges=box.truncated_edges[frame.turns:] + box.truncated_edges[:frame.turns],
                         covariance_m2=covariance_m2)
+
+
+class ScaleCheck(object):
+    """Checks the scale of depth images by the heights of the latest people. People who are partly hidden, truncated or
+    not standing are not counted, nor are other objects.
+
+    Three quarters of the heights must be too large, or too small.
+    """
+
+    def __init__(self):
+        self._heights_m = deque(maxlen=LATEST)
+
+    def factor(self, boxes):
+        """Add the `Box3D`s of one image, plausible or not.
+
+        Returns
+        -------
+        float or None
+            Factor by which depth must be multiplied to give people the usual height; a common factor if one is near.
+            None if the heights are possible or too few. After a factor, new people are collected.
+        """
+        self._heights_m.extend(float(box.size_m[1]) for box in boxes if _shows_standing_person(box))
+        if len(self._heights_m) < LATEST:
+            return None
+        lower_m, median_m, upper_m = sorted(self._heights_m)[LATEST // 4::LATEST // 4]
+        if upper_m >= HEIGHTS_M[0] and lower_m <= HEIGHTS_M[1]:
+            return None
+        self._heights_m.clear()
+        factor = PERSON_CLASS.height / median_m
+        ratios = np.abs(np.log(COMMON_FACTORS / factor))
+        return float(COMMON_FACTORS[ratios.argmin()] if ratios.min() < np.log(NEAR) else '%.2g' % factor)
+
+
+def _shows_standing_person(box):
+    x1, y1, x2, y2 = box.rect_px
+    is_supported = box.support >= LEAST_SUPPORT or box.size_m[1] > HEIGHTS_M[1]  # a giant is deeper than a body's layer
+    return box.label == PERSON and not box.truncated and is_supported and y2 - y1 >= LEAST_ASPECT * (x2 - x1)

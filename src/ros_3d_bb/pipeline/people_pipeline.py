@@ -35,7 +35,7 @@ class Settings(NamedTuple):
     """Detector, parameters of each node, and topics; for bags also concurrent searches and compression.
 
     `names` maps topics of the nodes to those used; `keep` lists the topics to copy (None: all). `camera_pose` is the
-    height, metres, tilt and roll, radians, of a camera without tf (see `image_rotation.mounted_camera`), or
+    height, metres, tilt and roll, radians, of a camera without tf (see `images.mounted_camera`), or
     `camera_pose.FLOOR`, if they are fitted to the floor.
     """
 

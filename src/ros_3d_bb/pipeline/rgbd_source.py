@@ -2,8 +2,8 @@
 import tf2_ros
 
 from ros_3d_bb.camera.alignment import ALIGN, size_fault
+from ros_3d_bb.camera.images import RgbdFrame, upright_frame
 from ros_3d_bb.camera.registration import RegisteredDepth
-from ros_3d_bb.camera.rgbd_frame import RgbdFrame, upright_frame
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, INFO_TOPICS, RAW
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (NEWEST, Boxes2D, boxes2d_from_msg, camera_from_msg, stamp_if_any,
@@ -100,7 +100,7 @@ class RgbdSource(object):
             frame_id = self._params.frame_id or self._color_frame
             registration = self._registration.geometry(depth, depth_frame, camera, frame_id)
             return RegisteredDepth(depth, registration), frame_id
-        height, width = depth.shape
+        height, width = depth.values.shape
         if (width, height) != (camera.width, camera.height):
             raise ValueError('%s; depth must be aligned to colour: %s' % (size_fault(camera, width, height), ALIGN))
         return depth, self._params.frame_id or depth_frame

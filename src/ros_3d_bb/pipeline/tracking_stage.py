@@ -14,10 +14,9 @@ from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, RAW, topic_of
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
 from ros_3d_bb.conversions.map_msgs import occupied_from_msg
 from ros_3d_bb.conversions.perception_msgs import camera_from_msg, stamp_of, time_from, usable_boxes3d
-from ros_3d_bb.core.camera_clocks import CameraClocks
 from ros_3d_bb.core.object_classes import read_object_classes
 from ros_3d_bb.core.params import CLASSES_FILE, DEPTH, DEPTH_SCALE, SET_BY_LAUNCH, STAMP_TOLERANCE, Param, parameters
-from ros_3d_bb.core.time_sync import NS, MessageCache
+from ros_3d_bb.core.time_sync import NS, CameraClocks, MessageCache
 from ros_3d_bb.estimation.error_model import error_model_of_param
 from ros_3d_bb.pipeline.depth_registration import DepthRegistration
 from ros_3d_bb.tracking.measurement_model import NoiseParams
@@ -173,7 +172,7 @@ class TrackingStage(object):
             raise ValueError('none of their %d boxes is valid; tracks are kept as they are' % len(faults))
         if camera:
             self._check_frame(message.header.frame_id, camera)
-        motions, untracked = self._tracker.common_motions, self._tracker.untracked_boxes
+        before = self._tracker.totals
         detections = detections_from_boxes(boxes, fixed_from_camera, self._classes)
         tracks = self._tracker.update(stamp_ns, detections,
                                       self._view(message.header, fixed_from_camera, camera, camera_name))
@@ -182,9 +181,10 @@ class TrackingStage(object):
             ignored = sum(areas.contains(detection.position_m, fixed_from_camera[:2, 3]) for detection in detections)
             self._events.count('boxes in ignored areas', ignored)
         self._events.count('images tracked')
-        if self._tracker.untracked_boxes > untracked:
-            self._events.count('3D boxes that became no track', self._tracker.untracked_boxes - untracked)
-        if self._tracker.common_motions > motions:
+        totals = self._tracker.totals
+        if totals.untracked_boxes > before.untracked_boxes:
+            self._events.count('3D boxes that became no track', totals.untracked_boxes - before.untracked_boxes)
+        if totals.common_motions > before.common_motions:
             self._events.warn('common motion compensated', 'the people at %.3f jumped together: the pose of the camera '
                               'in %s jumped, as after an error of the odometry; all tracks are moved with them'
                               % (stamp_ns / NS, self._params.target_frame))
@@ -216,17 +216,17 @@ class TrackingStage(object):
         """Return a CameraView with a depth image; without one that cannot be used, which bbox3d_node reports."""
         intrinsics = view.intrinsics
         if camera not in self._registrations:
-            if depth.shape != (intrinsics.height, intrinsics.width):
+            if depth.values.shape != (intrinsics.height, intrinsics.width):
                 return view
             return view._replace(depth_at=functools.partial(depths_towards, intrinsics, depth),
-                                 area_px=depth.measured_area())
+                                 measured_area=depth.measured_area)
         try:
             geometry = self._registrations[camera].geometry(depth, depth_frame, intrinsics,
                                                             self._params.camera_frame or boxes_frame)
         except ValueError:
             return view
         return view._replace(depth_at=functools.partial(_depths_from_beside, geometry, depth),
-                             area_px=geometry.area_px)
+                             measured_area=lambda: geometry.area_px)
 
     def _accept(self, stamp_ns, now_ns, camera):
         """Whether the stamp of boxes is consistent with those of the other cameras. Handles backward jumps in time, as

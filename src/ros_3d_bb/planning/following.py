@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.core.labels import PERSON
+from ros_3d_bb.core.object_classes import PERSON
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.core.time_sync import JUMP_NS, NS
 from ros_3d_bb.planning.planner_view import position_after, predicted_to

@@ -4,7 +4,7 @@ import functools
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.core.labels import PERSON
+from ros_3d_bb.core.object_classes import PERSON
 from ros_3d_bb.planning.planner_view import covariances_after, position_after
 
 BEHIND_M = 0.05  # smallest depth that is projected

@@ -5,8 +5,7 @@ Positions and velocities are as in `types.TrackedObject`; points are (n, 3), met
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.core.labels import label_fault, score_fault
-from ros_3d_bb.core.valid_ranges import MAX_COORDINATE_M, MAX_SIZE_M
+from ros_3d_bb.core.object_classes import MAX_COORDINATE_M, MAX_SIZE_M, label_fault, score_fault
 from ros_3d_bb.tracking.types import OUT_OF_VIEW
 
 SWATH_STEP_S = 0.1  # a person at 3 m/s moves 0.3 m, less than a body's width, so that the footprints overlap

@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.camera.depth_image import DepthImage
 from ros_3d_bb.camera.distortion import PLUMB_BOB
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.estimation.box3d_estimator import level_rotation
 

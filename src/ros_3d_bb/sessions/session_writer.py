@@ -12,7 +12,7 @@ import re
 import cv2
 import numpy as np
 
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.atomic_file import atomic_write
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.sessions.session_reader import FILE_NAME, read_description, read_session

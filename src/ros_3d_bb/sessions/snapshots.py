@@ -4,7 +4,7 @@ from typing import NamedTuple, Optional, Tuple
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.time_sync import MessageCache, StampSynchronizer
 from ros_3d_bb.estimation.box3d import Box3D
 

@@ -11,6 +11,7 @@ A pose jumps once. A motion that people's own acceleration explains, or that goe
 together, and is left to the filter.
 """
 import math
+from typing import Any, NamedTuple, Tuple
 
 import numpy as np
 
@@ -29,24 +30,47 @@ ROBOT_MPS2, ROBOT_RADPS2 = 2.0, 2.0  # acceleration of a robot, standard deviati
 FITS = 3  # the pairs are selected and the motion is fitted this many times; chosen
 
 
-def camera_velocity(latest, view, period_s):
-    """Mean velocity (x, y, angle) of a camera since its previous image, a CameraState; 0 without one."""
-    if latest is None or period_s <= 0:
-        return 0.0, 0.0, 0.0
-    x, y, angle = _pose_change(latest.view, view)
-    return x / period_s, y / period_s, angle / period_s
+class CameraMotion(NamedTuple):
+    """Motion of a camera since its previous image: the CameraState of that image, None if there is none; the time since
+    then, seconds, and the change of the pose and the mean velocity (x, y, angle); 0 without one.
+    """
+
+    previous: Any
+    period_s: float = 0.0
+    change: Tuple[float, float, float] = (0.0, 0.0, 0.0)
+    velocity: Tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
-def pose_jump(latest, known, measurements, view, period_s):
-    """Motion of the frame and its covariance (3, 3), as of `common_motion`, by which the pose of the camera deviates
-    from a constant velocity since its previous image, the CameraState `latest`.
+def camera_motion(previous, image):
+    """The CameraMotion until an image, given the CameraState of the previous image of the camera."""
+    if previous is None:
+        return CameraMotion(None)
+    period_s = (image.stamp_ns - previous.stamp_ns) / NS
+    before, after = previous.view.fixed_from_camera, image.view.fixed_from_camera
+    if period_s <= 0 or before is after:
+        return CameraMotion(previous, period_s)
+    (*was_across, was_x), (*was_along, was_y) = before[:2].tolist()
+    (*across, x), (*along, y) = after[:2].tolist()
+    angle = math.atan2(_dot(along, was_across) - _dot(across, was_along),
+                       _dot(across, was_across) + _dot(along, was_along))
+    x, y = x - was_x, y - was_y
+    return CameraMotion(previous, period_s, (x, y, angle), (x / period_s, y / period_s, angle / period_s))
+
+
+def _dot(first, second):
+    return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
+
+
+def pose_jump(camera, known, measurements, view):
+    """Motion of the frame and its covariance (3, 3), as of `common_motion`, by which the CameraMotion deviates from a
+    constant velocity.
 
     None unless it moves the known people by more than a robot can accelerate, and they fit it better.
     """
-    if latest is None or period_s <= 0 or not known or not measurements:
+    period_s = camera.period_s
+    if period_s <= 0 or not known or not measurements:
         return None
-    changes = _pose_change(latest.view, view)
-    motion = [change - period_s * velocity for change, velocity in zip(changes, latest.velocity)]
+    motion = [change - period_s * velocity for change, velocity in zip(camera.change, camera.previous.velocity)]
     half = period_s ** 2 / 2
     farthest_m = max(measurement.distance_m for measurement in measurements)
     if math.hypot(motion[0], motion[1]) + abs(motion[2]) * farthest_m <= LEAST_M + ROBOT_MPS2 * half:
@@ -61,20 +85,6 @@ def pose_jump(latest, known, measurements, view, period_s):
     nearest = [np.minimum(_distances2(innovations - shift, inverses), GATE).min(axis=1).sum()
                for shift in (0.0, shifts[:, None])]
     return (np.array(motion), spread) if nearest[0] - nearest[1] > USUAL else None
-
-
-def _pose_change(before, after):
-    """Translation and rotation (x, y, angle) of the camera between two CameraView."""
-    if before.fixed_from_camera is after.fixed_from_camera:
-        return 0.0, 0.0, 0.0
-    (*was_across, was_x), (*was_along, was_y) = before.fixed_from_camera[:2].tolist()
-    (*across, x), (*along, y) = after.fixed_from_camera[:2].tolist()
-    return x - was_x, y - was_y, math.atan2(_dot(along, was_across) - _dot(across, was_along),
-                                            _dot(across, was_across) + _dot(along, was_along))
-
-
-def _dot(first, second):
-    return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
 
 
 def may_jump(latest, others):

@@ -132,7 +132,9 @@ def measurements_of(detections, view, noise, kinds):
     measurements = []
     for number, (detection, side) in enumerate(zip(detections, _hidden_sides(detections, view))):
         x, y, _z = map(float, detection.position_m)
-        direction = _direction(x - camera_m[0], y - camera_m[1], ahead)
+        to_x, to_y = x - camera_m[0], y - camera_m[1]
+        distance_m = math.hypot(to_x, to_y)
+        direction = (distance_m, to_x / distance_m, to_y / distance_m) if distance_m >= NEAR_M else (NEAR_M, *ahead)
         measurements.append(_measurement(detection, number, side, kinds[detection.label], direction, noise))
     return measurements
 
@@ -163,12 +165,6 @@ def _measurement(detection, number, side, kind, direction, noise):
         x - shift_m * ray_y, y + shift_m * ray_x, z, along * ray_x * ray_x + across * ray_y * ray_y,
         (along - across) * ray_x * ray_y, along * ray_y * ray_y + across * ray_x * ray_x, float(zz), is_assumed, size_m,
         *direction, kind=kind, detection=detection, number=number)
-
-
-def _direction(x, y, ahead):
-    """Distance and unit vector (x, y) of a place relative to the camera."""
-    distance_m = math.hypot(x, y)
-    return (distance_m, x / distance_m, y / distance_m) if distance_m >= NEAR_M else (NEAR_M, *ahead)
 
 
 def _hidden_sides(detections, view):

@@ -157,7 +157,7 @@ def depths_towards(camera, depth, points):
     Parameters
     ----------
     camera : camera_model.Camera
-    depth : depth_image.DepthImage
+    depth : images.DepthImage
     points : numpy.ndarray, (k, 3)
         In the optical frame, metres.
 
@@ -199,7 +199,8 @@ def _shares_in_image(view, positions_m, heights_m, bearings):
     points[..., 2][~in_front] = 1  # they have no pixel
     with np.errstate(invalid='ignore'):  # nan is outside
         pixels = camera.project(points)
-        low_px, high_px = np.reshape(view.area_px or (0, 0) + camera[:2], (2, 2)) - 0.5
+        area_px = view.measured_area() if view.measured_area else (0, 0) + camera[:2]
+        low_px, high_px = np.reshape(area_px, (2, 2)) - 0.5
         margin_px = np.multiply(EDGE_RAD, (camera.fx, camera.fy))
         inside = ((pixels >= low_px + margin_px) & (pixels <= high_px - margin_px)).all(axis=-1)
     return (in_front & inside).sum(axis=1) / len(AXIS_SAMPLES)

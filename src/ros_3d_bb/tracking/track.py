@@ -325,27 +325,18 @@ def published(tracks, params):
 
 
 def _numbers_of(track, standing2):
-    """The numbers of a track that are published, in the order of `POSITION` and the others below it."""
-    u, v = _expected_velocity(track)
-    speed2 = u * u + v * v
-    share = speed2 / (speed2 + standing2)
-    manoeuvring = _manoeuvre_weight(track) * (
-        WALKING_SHARE + (1 - WALKING_SHARE) * WALKING_M2PS2 / (WALKING_M2PS2 + speed2))
-    return track.state + (track.z_m, track.z_m2, 0.0, share * u, share * v) + track.size_m + (manoeuvring,)
+    """The numbers of a track that are published, in the order of `POSITION` and the others below it.
 
-
-def _expected_velocity(track):
-    """Velocity (x, y) of the prediction: between that of the filter and the slow one."""
-    (slow_u, slow_v), state = track.slow_mps, track.state
-    return state.u + SLOW_SHARE * (slow_u - state.u), state.v + SLOW_SHARE * (slow_v - state.v)
-
-
-def _manoeuvre_weight(track):
-    """Probability 0..1 that a person is in a manoeuvre: the velocity has changed by more than its covariance explains.
+    A person is in a manoeuvre if the velocity differs from the slow one by more than its covariance explains.
     """
-    (slow_u, slow_v), state = track.slow_mps, track.state
-    change2 = (slow_u - state.u) ** 2 + (slow_v - state.v) ** 2
-    return change2 / (change2 + MANOEUVRE * (state.uu + state.vv) / 2 + LEAST_SPEED2)
+    state, (slow_u, slow_v) = track.state, track.slow_mps
+    change_u, change_v = slow_u - state.u, slow_v - state.v
+    u, v = state.u + SLOW_SHARE * change_u, state.v + SLOW_SHARE * change_v
+    speed2, change2 = u * u + v * v, change_u ** 2 + change_v ** 2
+    share = speed2 / (speed2 + standing2)
+    manoeuvring = change2 / (change2 + MANOEUVRE * (state.uu + state.vv) / 2 + LEAST_SPEED2)  # its probability
+    manoeuvring *= WALKING_SHARE + (1 - WALKING_SHARE) * WALKING_M2PS2 / (WALKING_M2PS2 + speed2)
+    return state + (track.z_m, track.z_m2, 0.0, share * u, share * v) + track.size_m + (manoeuvring,)
 
 
 @functools.lru_cache(maxsize=16)

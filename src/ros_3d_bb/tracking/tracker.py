@@ -2,7 +2,7 @@
 
 Each person is tracked by a constant-velocity Kalman filter in the plane (`kalman_filter`). Detections are assigned to
 tracks by maximum total likelihood (`association`). A detection that a new target explains better starts a track
-(`birth`), which is published once it is likely to be a person (`track`). If most people seem to jump in the same way,
+(`initiate`) that is published once it is likely to be a person (`track`). If most people seem to jump in the same way,
 the pose of the camera jumped, and all tracks are moved (`common_motion`). Undetected people are not dropped
 immediately: their tracks stay published for a short time if a camera should detect them, and for longer if a person or
 an object occludes them (`occlusion`). Unpublished tracks are kept for longer still, so that people who reappear keep
@@ -16,9 +16,8 @@ from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.association import associate
-from ros_3d_bb.tracking.birth import NEW_NS, duplicates, initiate
-from ros_3d_bb.tracking.common_motion import (FEWEST, SETTLED_NS, camera_velocity, common_motion, may_jump, most_fit,
+from ros_3d_bb.tracking.association import NEW_NS, associate, duplicates, initiate
+from ros_3d_bb.tracking.common_motion import (FEWEST, SETTLED_NS, camera_motion, common_motion, may_jump, most_fit,
                                               moved, pose_jump)
 from ros_3d_bb.tracking.ignored_areas import IgnoredAreas, polygons_from
 from ros_3d_bb.tracking.manoeuvres import match_manoeuvres
@@ -29,7 +28,7 @@ from ros_3d_bb.tracking.occlusion import CameraState, mark_missed, recent_others
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, OutOfSequenceBuffer
 from ros_3d_bb.tracking.track import (MIN_TRACK_SCORE, SEEN, PredictionParams, Rules, Track, learned_prediction,
                                       published)
-from ros_3d_bb.tracking.types import MOVING_SPEED, VISIBLE, TrackerBase
+from ros_3d_bb.tracking.types import MOVING_SPEED, VISIBLE, Totals, TrackerBase
 
 KNOWN_NS = 60 * NS  # a camera without images for longer than this, while others send images, counts as new; chosen
 MAX_POSITION_STD_M = 2.4  # tracks whose position is less certain are dropped; chosen
@@ -89,17 +88,16 @@ class TrackerParams(NamedTuple):
 
 class _State(NamedTuple):
     """State of the tracker after an image: the tracks, the stamp of the latest image, the `CameraState` of each camera,
-    the number of images with a common motion, the stamp of the latest image that most people did not fit (None
-    without), the learned `measurement_model.learned_log_scale`, and the number of boxes that never became a track.
+    the stamp of the latest image that most people did not fit (None without), the learned
+    `measurement_model.learned_log_scale`, and the Totals.
     """
 
     tracks: Sequence[Track]
     now_ns: Optional[int]
     cameras: dict
-    common_motions: int
     misfit_ns: Optional[int]
     log_noise_scale: float
-    untracked_boxes: int
+    totals: Totals
 
 
 class Tracker(TrackerBase):
@@ -121,7 +119,7 @@ class Tracker(TrackerBase):
         self.reconfigure(params, noise, prediction)
 
     def _start(self, last_id, log_noise_scale=0.0):
-        self._buffer = OutOfSequenceBuffer(self._step, _State([], None, {}, 0, None, log_noise_scale, 0), last_id)
+        self._buffer = OutOfSequenceBuffer(self._step, _State([], None, {}, None, log_noise_scale, Totals()), last_id)
 
     def reconfigure(self, params, noise, prediction):
         """Change the parameters and keep the tracks. Raises ValueError without any change if one is invalid."""
@@ -166,14 +164,9 @@ class Tracker(TrackerBase):
         return self._published()
 
     @property
-    def common_motions(self):
-        """Number of images in which the pose of the camera jumped (`common_motion`), since the last reset."""
-        return self._buffer.state.common_motions
-
-    @property
-    def untracked_boxes(self):
-        """Number of boxes that never became a track, since the last reset: their tracks ended unpublished."""
-        return self._buffer.state.untracked_boxes
+    def totals(self):
+        """The Totals until the newest image."""
+        return self._buffer.state.totals
 
     def tracks(self):
         """The published tracks as TrackedObject, ordered by ID, at the stamp of the newest image; with all images."""
@@ -189,15 +182,17 @@ class Tracker(TrackerBase):
 
     def _step(self, before, image, observed_s, assign_id):
         """One cycle of the tracker: see `step` of OutOfSequenceBuffer."""
+        camera = camera_motion(before.cameras.get(image.view.camera), image)
         tracks = self._predict(before, image.stamp_ns)
-        measurements = self._measure(before, image)
-        matches, fits, is_moved = self._associate(before, tracks, measurements, image)
-        if len(matches) < len(measurements) and not is_moved:
-            matches += self._match_manoeuvres(before, tracks, measurements, matches, image)
+        measurements = self._measure(before, image, camera.period_s)
+        matches, fits, is_moved = self._associate(before, tracks, measurements, image, camera)
+        if len(matches) < len(measurements) and not is_moved and camera.previous:
+            matches += match_manoeuvres(tracks, measurements, matches, camera.previous.stamp_ns, image.stamp_ns,
+                                        self._params[0].height_sigma)
         matched = {track.id: (track.is_confirmed, measurement.number) for track, measurement in matches}
         log_noise_scale = learned_log_scale(before.log_noise_scale, matches)
         self._update_matched(matches, log_noise_scale - max(before.log_noise_scale, 0), image)
-        cameras = self._cameras_after(before, image, matches, fits)
+        cameras = self._cameras_after(before, image, camera, matches, fits)
         missed = [track for track in tracks if track.id not in matched]
         if missed:
             mark_missed(missed, tracks, before.tracks, cameras, image.view.camera, observed_s,
@@ -210,8 +205,8 @@ class Tracker(TrackerBase):
                          and not self.ignored.contains((measurement.x, measurement.y), camera_m)]
             tracks += initiate(tracks, unmatched, image, self._params[0], self._rules, assign_id)
         misfit_ns = image.stamp_ns if fits is False else before.misfit_ns
-        state = _State(tracks, image.stamp_ns, cameras, before.common_motions + is_moved, misfit_ns, log_noise_scale,
-                       before.untracked_boxes + untracked_boxes)
+        totals = Totals(before.totals.common_motions + is_moved, before.totals.untracked_boxes + untracked_boxes)
+        state = _State(tracks, image.stamp_ns, cameras, misfit_ns, log_noise_scale, totals)
         return state, [(track_id,) + match for track_id, match in matched.items()]
 
     def _predict(self, before, stamp_ns):
@@ -220,26 +215,25 @@ class Tracker(TrackerBase):
         acceleration = self._params[0].acceleration
         return [track.predicted(elapsed_s, acceleration) for track in before.tracks]
 
-    def _measure(self, before, image):
+    def _measure(self, before, image, period_s):
         """The measurements of the image, with the noise for the association: a learned scale that is too small must not
         separate people from their tracks."""
         params, noise, _prediction = self._params
-        images = correlated_images(_period_s(before, image), self._detector, params.acceleration)
+        images = correlated_images(period_s, self._detector, params.acceleration)
         noise = BoxNoise(noise.noise_unknown, math.exp(max(before.log_noise_scale, 0)), self._detector.lasting_sigma_m,
                          images)
         return measurements_of(image.detections, image.view, noise, self._kinds)
 
-    def _associate(self, before, tracks, measurements, image):
+    def _associate(self, before, tracks, measurements, image, camera):
         """Assign measurements to tracks; if the pose of the camera jumped, the tracks are moved before.
 
         Returns the matches [(Track, Measurement)], whether most people fit without a motion (None if unknown), and
         whether there was one.
         """
         stamp_ns, params, outliers = image.stamp_ns, self._params[0], self._rules.outliers
-        latest, period_s = before.cameras.get(image.view.camera), _period_s(before, image)
-        known = [track for track in tracks if latest and track.is_confirmed
+        known = [track for track in tracks if camera.previous and track.is_confirmed
                  and track.visibility.get(image.view.camera) == SEEN]
-        motion = pose_jump(latest, known, measurements, image.view, period_s)
+        motion = pose_jump(camera, known, measurements, image.view)
         if motion is not None:
             return self._associate_moved(tracks, measurements, image, motion), None, True
         matches = associate(tracks, measurements, stamp_ns, params, outliers)
@@ -248,9 +242,9 @@ class Tracker(TrackerBase):
         fits = most_fit(known, matches, len(measurements))
         is_settled = before.misfit_ns is None or stamp_ns - before.misfit_ns > SETTLED_NS
         if fits is not False or not is_settled or not may_jump(
-                latest, recent_others(before.cameras, image.view.camera, stamp_ns).values()):
+                camera.previous, recent_others(before.cameras, image.view.camera, stamp_ns).values()):
             return matches, fits, False
-        motion = common_motion(known, measurements, image.view, period_s)
+        motion = common_motion(known, measurements, image.view, camera.period_s)
         if motion is None:
             return matches, fits, False
         return self._associate_moved(tracks, measurements, image, motion), fits, True
@@ -261,31 +255,22 @@ class Tracker(TrackerBase):
             track.state = moved(track.state, *motion, view=image.view)
         return associate(tracks, measurements, image.stamp_ns, self._params[0], self._rules.outliers)
 
-    def _match_manoeuvres(self, before, tracks, measurements, matches, image):
-        """The further matches [(Track, Measurement)] of people who leave the gate, see `manoeuvres`."""
-        latest = before.cameras.get(image.view.camera)
-        if latest is None:
-            return []
-        return match_manoeuvres(tracks, measurements, matches, latest.stamp_ns, image.stamp_ns,
-                                self._params[0].height_sigma)
-
     def _update_matched(self, matches, log_factor, image):
         """Update the tracks of the matches, with the variance of assumed noise multiplied by exp(`log_factor`)."""
         scale = math.exp(log_factor)
         for track, measurement in matches:
             track.update(scaled(measurement, scale), image.stamp_ns, image.view.camera, self._rules)
 
-    def _cameras_after(self, before, image, matches, fits):
+    def _cameras_after(self, before, image, camera, matches, fits):
         """The CameraState of each camera after an image with matches."""
-        latest = before.cameras.get(image.view.camera)
+        latest = camera.previous
         range_m = self._detector.max_range_m
         if range_m is None:
             range_m = learned_range(latest.range_m if latest else DEFAULT_RANGE_M, matches)
         if fits is None and latest:
             fits = latest.fits
         cameras = {name: known for name, known in before.cameras.items() if image.stamp_ns - known.stamp_ns <= KNOWN_NS}
-        cameras[image.view.camera] = CameraState(
-            image.stamp_ns, image.view, range_m, fits, camera_velocity(latest, image.view, _period_s(before, image)))
+        cameras[image.view.camera] = CameraState(image.stamp_ns, image.view, range_m, fits, camera.velocity)
         return cameras
 
     def _delete(self, tracks, stamp_ns):
@@ -302,9 +287,3 @@ class Tracker(TrackerBase):
             elif not track.is_confirmed:
                 untracked_boxes += track.hits
         return kept, untracked_boxes
-
-
-def _period_s(before, image):
-    """Time since the previous image of the same camera, seconds; 0 without one."""
-    latest = before.cameras.get(image.view.camera)
-    return (image.stamp_ns - latest.stamp_ns) / NS if latest else 0.0

@@ -4,9 +4,9 @@ from typing import Callable, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from ros_3d_bb.camera.camera_model import Camera, upright_turns
-from ros_3d_bb.core.labels import PERSON
-from ros_3d_bb.core.object_classes import ObjectClasses
+from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.images import quarter_turns
+from ros_3d_bb.core.object_classes import PERSON, ObjectClasses
 from ros_3d_bb.core.params import Param
 from ros_3d_bb.tracking.ignored_areas import IgnoredAreas
 
@@ -59,7 +59,8 @@ def detections_from_boxes(boxes, fixed_from_camera, classes=ObjectClasses()):
         Pose of the camera's optical frame in the fixed frame.
     classes : object_classes.ObjectClasses
     """
-    turns, rows, rotation = upright_turns(fixed_from_camera), fixed_from_camera[:3].tolist(), fixed_from_camera[:3, :3]
+    turns = quarter_turns(fixed_from_camera[2, :3])  # the z axis of the fixed frame points up
+    rows, rotation = fixed_from_camera[:3].tolist(), fixed_from_camera[:3, :3]
     detections = []
     for index, box in boxes.items():
         (x, y, z), (width_m, height_m) = map(float, box.center_m), map(float, box.size_m[:2])
@@ -98,15 +99,15 @@ class CameraView(NamedTuple):
 
     `intrinsics` is None if unknown. `camera` identifies the camera. `depth_at` is None without a depth image; otherwise
     it is a function that takes points (k, 3) in the optical frame and returns the depths (k,) measured in their
-    direction, metres, nan without valid depth. `area_px` is the part of the image (x1, y1, x2, y2) in which depth is
-    measured; None: all of it.
+    direction, metres, nan without valid depth. `measured_area` returns the part of the image (x1, y1, x2, y2) in which
+    depth is measured; None: all of it.
     """
 
     fixed_from_camera: np.ndarray
     intrinsics: Optional[Camera] = None
     camera: str = ''
     depth_at: Optional[Callable[[np.ndarray], np.ndarray]] = None
-    area_px: Optional[Tuple[int, int, int, int]] = None
+    measured_area: Optional[Callable[[], Tuple[int, int, int, int]]] = None
 
     @property
     def ahead(self):
@@ -156,13 +157,21 @@ class TrackedObject(NamedTuple):
     detection: int = NOT_DETECTED
 
 
+class Totals(NamedTuple):
+    """Number of images in which the pose of the camera jumped (`common_motion`), and of boxes whose tracks ended
+    unpublished, since the last reset.
+    """
+
+    common_motions: int = 0
+    untracked_boxes: int = 0
+
+
 class TrackerBase(object):
     """Base class of the trackers. The IDs of tracks are greater than `last_id` of the constructor, and tracks never
     change between the groups of its table of classes, an `object_classes.ObjectClasses`.
     """
 
-    common_motions = 0  # number of images in which the pose of the camera jumped
-    untracked_boxes = 0  # number of boxes that never became a track
+    totals = Totals()
     ignored = IgnoredAreas()  # where no track starts
 
     def reconfigure(self, *params):

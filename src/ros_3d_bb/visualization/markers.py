@@ -8,7 +8,7 @@ from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ros_3d_bb.core.labels import described
+from ros_3d_bb.core.object_classes import described
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
@@ -228,7 +228,15 @@ def _ellipses(covariances_m2, centers_m):
     semi_axes_m = np.sqrt(CHI2_95 * np.maximum(variances_m2, 0))
     offsets_m = np.matmul(CIRCLE * semi_axes_m[:, np.newaxis], axes.transpose(0, 2, 1))
     outlines_m = (offsets_m + centers_m[:, np.newaxis, :2]).tolist()
-    return [_points([(x, y, z) for x, y in outline_m]) for outline_m, z in zip(outlines_m, centers_m[:, 2].tolist())]
+    outlines = []
+    for outline_m, z in zip(outlines_m, centers_m[:, 2].tolist()):
+        outline = []
+        for x, y in outline_m:
+            point = Point()  # as `_point`, without as many calls
+            point.x, point.y, point.z = x, y, z
+            outline.append(point)
+        outlines.append(outline)
+    return outlines
 
 
 def _pose(position_m):
@@ -240,16 +248,6 @@ def _point(x, y, z):
     point = Point()
     point.x, point.y, point.z = x, y, z
     return point
-
-
-def _points(places_m):
-    """As `_point`, for each of several places."""
-    points = []
-    for place_m in places_m:
-        point = Point()
-        point.x, point.y, point.z = place_m
-        points.append(point)
-    return points
 
 
 @functools.lru_cache(maxsize=None)

@@ -7,7 +7,7 @@ import collections
 import cv2
 import numpy as np
 
-from ros_3d_bb.core.labels import described
+from ros_3d_bb.core.object_classes import described
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.visualization.image_overlay import colorize_depth, draw_boxes, depth_to_grey
 

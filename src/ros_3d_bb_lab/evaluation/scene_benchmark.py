@@ -1,7 +1,7 @@
 """Benchmark of the pipeline on simulated scenes with different detectors, against ground truth."""
 import numpy as np
 
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.detection.boxes import Detections
 from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.depth.ground_plane import floor_from_transform

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.camera.depth_image import DepthImage
-from ros_3d_bb.core.labels import PERSON
+from ros_3d_bb.camera.images import DepthImage
+from ros_3d_bb.core.object_classes import PERSON
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.estimation.box3d import plausible

@@ -14,11 +14,11 @@ from typing import NamedTuple, Tuple
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from, transform_points
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.estimation.box3d import ImageGeometry, plausible
-from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimate_median, estimator_named, sample_depth
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
@@ -118,7 +118,7 @@ class Theirs(object):
     def estimate(self, depth, rects_px):
         """3D boxes in the frame of the camera."""
         geometry = ImageGeometry(self._camera, (0, 0) + self._camera[:2])
-        boxes = [estimate_median(sample_depth(depth, rect_px, 20), rect_px, geometry) for rect_px in rects_px]
+        boxes = estimator_named('median').estimate(depth, rects_px, geometry, None)
         return [box for box in boxes if box is not None]
 
     def track(self, stamp_ns, boxes):

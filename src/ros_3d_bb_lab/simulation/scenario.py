@@ -8,7 +8,7 @@ from typing import NamedTuple, Optional, Tuple
 
 import yaml
 
-from ros_3d_bb.core.labels import label_fault
+from ros_3d_bb.core.object_classes import label_fault
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.core.yaml_loader import load_yaml
 from ros_3d_bb_lab.simulation.scene_objects import SHAPES

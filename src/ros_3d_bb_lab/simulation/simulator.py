@@ -5,7 +5,7 @@ import cv2
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from, transform_points
-from ros_3d_bb.core.labels import PERSON
+from ros_3d_bb.core.object_classes import PERSON
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject, prediction_times_s
 from ros_3d_bb_lab.simulation.body import Body, Build

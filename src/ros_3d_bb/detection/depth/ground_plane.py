@@ -49,7 +49,7 @@ class Floor(NamedTuple):
 
 
 class CameraPose(NamedTuple):
-    """Pose of a camera above the floor; the angles are those of `camera.image_rotation.mounted_camera`."""
+    """Pose of a camera above the floor; the angles are those of `camera.images.mounted_camera`."""
 
     height_m: float
     tilt_rad: float
@@ -111,7 +111,7 @@ def fit_floor(depth, camera, params=DepthPeopleParams()):
 
     Parameters
     ----------
-    depth : ros_3d_bb.camera.depth_image.DepthImage
+    depth : ros_3d_bb.camera.images.DepthImage
     camera : ros_3d_bb.camera.camera_model.Camera
     params : DepthPeopleParams
         Limits of the height and tilt of the camera.

@@ -3,7 +3,7 @@ import functools
 from collections import OrderedDict
 from typing import Callable, NamedTuple, Tuple
 
-from ros_3d_bb.core.labels import COCO
+from ros_3d_bb.core.object_classes import COCO
 from ros_3d_bb.detection.onnx.decoders import (cell_count, decode_columns, decode_distances, decode_final, decode_rows,
                                                decode_yolox, is_probability)
 from ros_3d_bb.detection.weights import MAX_CLASSES

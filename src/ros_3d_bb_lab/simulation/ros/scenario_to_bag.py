@@ -5,7 +5,7 @@ import numpy as np
 from std_msgs.msg import Header
 
 from ros_3d_bb.bags.bag_writer import bag_command_parser, write_bag_of_command
-from ros_3d_bb.camera.depth_image import DepthImage
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.conversions.camera_msgs import START_NS, TF_TOPIC, CameraFrame, frame_id_of, messages_of, topic_of
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, boxes2d_to_msg, time_from, tracks_to_msg
 from ros_3d_bb.core.time_sync import NS

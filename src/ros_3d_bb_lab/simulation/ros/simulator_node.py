@@ -12,7 +12,7 @@ from std_msgs.msg import Int32MultiArray, Time
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, START_NS, TF_TOPIC, TYPES, topic_of
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, time_from
-from ros_3d_bb.core.labels import PERSON
+from ros_3d_bb.core.object_classes import PERSON
 from ros_3d_bb.core.params import WAIT_FOR_SUBSCRIBERS, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
