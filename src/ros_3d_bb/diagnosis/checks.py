@@ -143,7 +143,7 @@ def _stamps(seen):
 def _stamp_fault(seen, key):
     stream = seen.streams[key]
     stamps_ns, topic = stream.stamps_ns, stream.topic
-    if not stream.count or (not stamps_ns and key == INFO):  # camera_info is used without a stamp
+    if not stream.count or (key == INFO and max(stamps_ns, default=0) < LATEST_NS):  # one is valid for all images
         return '', ''
     if not stamps_ns:
         return 'the messages on %s have no stamp (zero)' % topic, UNSTAMPED_FIX
