@@ -100,6 +100,23 @@ def test_names_of_topics_are_given_as_remappings(bag, tmp_path, monkeypatch, nam
     assert faults_in(changed(bag, tmp_path, renamed)) == []
 
 
+COLOR_RECT, DEPTH_RECT = '/camera/rgb/image_rect_color', '/camera/depth_registered/image_rect'
+
+
+def rectified(topic, message):
+    """As of a Kinect with image_proc: the camera_info is that of the raw colour images, and P that of the rectified."""
+    if topic == INFO:
+        message.K, message.D = [525, 0, 319.5, 0, 525, 239.5, 0, 0, 1], [0.2, -0.5, 0, 0, 0]
+    return {'/camera/color/image_raw': COLOR_RECT, DEPTH: DEPTH_RECT}.get(topic, topic), message
+
+
+def test_rectified_images_have_the_intrinsics_of_the_rectified_camera(bag, tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, 'argv', ['doctor', DEPTH + ':=' + DEPTH_RECT, '/camera/color/image_raw:=' + COLOR_RECT])
+    found, command = examined(changed(bag, tmp_path, rectified))
+    assert [finding for finding in found if finding.fault] == [] and 'process_bag' in command
+    assert any('focal length 615' in finding.fact for finding in found)
+
+
 def of_another_driver(topic, message):
     if topic in ('/ground_truth', '/yolo_bounding_box'):
         return '/another' + topic, message

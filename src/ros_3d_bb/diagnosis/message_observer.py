@@ -11,7 +11,8 @@ from tf2_msgs.msg import TFMessage
 from ros_3d_bb.bags.bag_reader import BagReader, message_in
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.camera.alignment import EdgeComparison, frames_fault, size_fault
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, IMAGE_KINDS, RAW, STATIC_TOPIC, TF_TOPIC, uncompressed
+from ros_3d_bb.conversions.camera_msgs import (DEPTH_TOPICS, IMAGE_KINDS, RAW, STATIC_TOPIC, TF_TOPIC, info_of_images,
+                                               uncompressed)
 from ros_3d_bb.conversions.image_msgs import DEPTH_SCALES, imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, camera_from_msg, time_from
 from ros_3d_bb.core.time_sync import NS, SAME_NS
@@ -108,13 +109,18 @@ def observations_of(observed, depth_info, topics, seconds, publishers_of=lambda 
     `observed` has an Observation for each role, `depth_info` is that of the camera_info of depth, and `publishers_of`
     returns the publishers of a topic; it is called for silent ones.
     """
+    color_key = COLOR if others['depth_is_raw'] else DEPTH  # of the images with the intrinsics of colour
+
+    def camera_of(images):
+        return lambda message: camera_from_msg(info_of_images(message, observed[images].topic))
+
     streams = {}
     for key, one in observed.items():
         publishers = publishers_of(one.topic) if one.newest is None and one.topic in topics else ()
         streams[key] = one.stream(topics.get(one.topic, ''), publishers)
     return Observations(streams, topics, seconds,
-                        color_info=_newest(observed[INFO].newest, camera_from_msg),
-                        depth_info=_newest(depth_info.newest, camera_from_msg),
+                        color_info=_newest(observed[INFO].newest, camera_of(color_key)),
+                        depth_info=_newest(depth_info.newest, camera_of(DEPTH)),
                         color=_newest_image(observed[COLOR].newest, imgmsg_to_rgb),
                         depth=_newest_image(observed[DEPTH].newest,
                                             functools.partial(imgmsg_to_depth, check_unit=True)), **others)
