@@ -223,3 +223,11 @@ def test_robot10_is_not_robot1():
         sleep.side_effect = lambda _s: connections.subscribers['/diagnostics'].callback(message)
         seen = GraphObserver(camera='').observations()
     assert set(seen.nodes) == {'robot1/bbox3d_node'} and seen.streams['depth'].topic == '/robot1' + DEPTH
+
+
+def test_invalid_parameters_which_the_nodes_report_do_not_end_the_doctor():
+    params = {'/bbox3d_node/depth': 'registered', '/bbox3d_node/cache_length': 'long', '/tracker_node/target_frame': [1]}
+    with masterless(params), mock.patch('time.sleep'), \
+            mock.patch('ros_3d_bb.nodes.common.graph_observer.published_topics', dict):
+        seen = GraphObserver().observations()
+    assert seen.streams['depth'].topic == DEPTH and seen.cache_length_s == 1.0
