@@ -7,6 +7,7 @@ from unittest import mock
 import cv2
 import numpy as np
 import pytest
+import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from sensor_msgs.msg import CameraInfo
 
@@ -138,6 +139,18 @@ def test_next_commands_lead_from_a_bag_to_a_picture_of_its_tracks(bag, tmp_path)
     picture = cv2.imread(str(tmp_path / 'tracked.png'))
     assert (picture == [60, 220, 40]).all(axis=2).any()  # 2D boxes in the images of that topic
     assert 'scene_report' in next_command_in('rosrun ros_3d_bb doctor tracked.bag', tmp_path)
+
+
+def with_old_tf(topic, message):
+    for transform in message.transforms if topic == '/tf' else ():
+        transform.header.stamp -= rospy.Duration(9)
+    return topic, message
+
+
+def test_a_pose_of_another_time_is_corrected_before_the_next_command(bag, tmp_path):
+    """process_bag accepts no height of the camera while tf contains its pose."""
+    found, command = examined(changed(bag, tmp_path, with_old_tf))
+    assert [finding.subject for finding in found if finding.fault] == ['transforms'] and command == ''
 
 
 RAW, RAW_INFO = '/front/depth/image_rect_raw', '/front/depth/camera_info'

@@ -7,10 +7,9 @@ from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault, si
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, INFO_TOPICS
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, LATEST_NS, TRACKS_TOPIC
 from ros_3d_bb.diagnosis.observations import IMAGE, KEPT, Finding, Role
-from ros_3d_bb.diagnosis.tf_tree import pose_fix, why_missing
+from ros_3d_bb.diagnosis.tf_tree import pose_fix, root_of, why_missing
 from ros_3d_bb.diagnosis.topic_faults import (LATE_S, MIN_PAIRED, MIN_RATE_HZ, NO_CLOCK, clock_fault, paired_share,
                                               silence_fault, span)
-from ros_3d_bb.pipeline.transform_buffer import path_to_root
 
 COLOR, DEPTH, INFO, BOXES2D, BOXES3D, TRACKS = 'color', 'depth', 'info', 'boxes2d', 'boxes3d', 'tracks'
 IMAGES = COLOR, DEPTH, INFO
@@ -112,8 +111,8 @@ def _registration_fault(seen):
     if seen.depth_info is None:
         return ('there is no camera_info of the depth camera', 'record it, or remap %s to it' % DEPTH_TOPICS['raw'][1])
     color, depth = (one.message.header.frame_id.lstrip('/') for one in (seen.color_info, seen.depth))
-    parents = {frame: link.parent for frame, link in seen.tf.links.items()} if seen.tf is not None else {}
-    if path_to_root(parents, color)[-1] != path_to_root(parents, depth)[-1]:
+    links = seen.tf.links if seen.tf is not None else {}
+    if root_of(links, color) != root_of(links, depth):
         return ('tf has no transform from %s to %s, with which raw depth is registered' % (depth, color),
                 'record /tf_static of the camera driver (publish_tf:=true)')
     return ()

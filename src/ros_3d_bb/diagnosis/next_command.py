@@ -4,6 +4,7 @@ from shlex import quote
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, DEPTH_TOPICS, RAW, info_topic_beside
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.diagnosis.checks import COLOR, DEPTH, IMAGES, TRACKS
+from ros_3d_bb.diagnosis.tf_tree import root_of
 from ros_3d_bb.diagnosis.topic_faults import other_topic
 
 MIN_ROLL_RAD = 0.02  # smaller ones are within the error of the fitted floor
@@ -38,7 +39,8 @@ def next_command(bag, seen, found):
         others.update((name, topic) for name, topic in raw_topics if topic.lstrip('/') != name)
     if purpose and all(others.values()):
         return 'rosrun ros_3d_bb doctor %s%s%s' % (quote(bag), option, _remappings(dict(names, **others))), purpose
-    if missing or faults - {'transforms', 'image rotation'}:
+    has_pose = seen.tf is not None and seen.tf.fault and root_of(seen.tf.links, seen.tf.source) == seen.tf.target
+    if missing or faults - {'transforms', 'image rotation'} or has_pose:  # in tf, but of another time
         return '', ''
     pose, hint = _pose(seen.mount) if faults else ('', '')
     command = 'rosrun ros_3d_bb process_bag %s tracked.bag --detector depth%s%s%s && %s' % (
