@@ -15,6 +15,9 @@ from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.diagnosis.checks import ROLES
+from ros_3d_bb.diagnosis.message_observer import Observation
 from ros_3d_bb.nodes.common.graph_observer import GraphObserver
 from ros_3d_bb.nodes.doctor import bag_findings, machine_findings
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
@@ -222,6 +225,14 @@ def test_a_missing_master_is_reported(monkeypatch, uri, fault):
         monkeypatch.setenv('ROS_MASTER_URI', uri or 'http://localhost:%d' % unused.getsockname()[1])
         found, = machine_findings()
     assert found.subject == 'master' and fault in found.fault and found.fix
+
+
+def test_the_rate_is_that_of_a_bag_that_is_looped():
+    """Of a second at 10 Hz, three times. The time of a message before the first /clock is 0."""
+    seen = Observation(ROLES['depth'], DEPTH)
+    for ros_ns in [0] + [NS + number % 10 * NS // 10 for number in range(30)]:
+        seen.take(DiagnosticArray(), ros_ns)
+    assert seen.stream('').rate_hz == pytest.approx(10, rel=0.15)
 
 
 def test_robot10_is_not_robot1():

@@ -66,13 +66,14 @@ class Observation(object):
 
     def __init__(self, role, topic):
         self.role, self.topic, self.newest, self.on_message = role, topic, None, lambda: None
-        self._count, self._first_ns, self._last_ns = 0, None, None
+        self._count, self._passed_ns, self._last_ns = 0, 0, None
         self._stamps_ns, self._lags_s = collections.deque(maxlen=KEPT), (None, None)
 
     def take(self, message, ros_ns, machine_s=None):
         """Record a message with its arrival in ROS time (0 before the first /clock message) and in machine time."""
         self._count += 1
-        self._first_ns, self._last_ns = ros_ns if self._first_ns is None else self._first_ns, ros_ns
+        self._passed_ns += max(ros_ns - (self._last_ns or ros_ns), 0)  # not from the end of a looped bag to its start
+        self._last_ns = ros_ns
         self.newest = message
         stamp_ns = _stamp_in(message)
         if stamp_ns:
@@ -82,9 +83,9 @@ class Observation(object):
         self.on_message()
 
     def stream(self, published_kind, publishers=()):
-        passed_s = (self._last_ns - self._first_ns) / NS if self._count > 1 else 0.0  # negative after a jump in time
-        return Stream(self.role, self.topic, published_kind, publishers, self._count,
-                      (self._count - 1) / passed_s if passed_s > 0 else 0.0, tuple(self._stamps_ns), *self._lags_s)
+        rate_hz = (self._count - 1) * NS / self._passed_ns if self._passed_ns else 0.0
+        return Stream(self.role, self.topic, published_kind, publishers, self._count, rate_hz, tuple(self._stamps_ns),
+                      *self._lags_s)
 
     def tf_seen(self, transforms, target_frame, source_frame=''):
         """Look up the pose of the camera in the fixed frame at the stamp of an image. None without images.
