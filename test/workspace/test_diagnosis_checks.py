@@ -133,6 +133,10 @@ def test_camera_info_needs_no_stamp_of_its_image(stamps_ns, lag_s, is_bag):
     assert faults_in(with_stream(INFO, stamps_ns=stamps_ns, lag_s=lag_s)._replace(is_bag=is_bag)) == []
 
 
+def test_a_wrong_frame_that_a_parameter_replaces_is_no_fault():
+    assert faults_in(sound(depth=image_seen('16UC1', frame_id='wrong'), frame_id='optical')) == []
+
+
 @pytest.mark.parametrize('seen, subject, fault, fix', CASES)
 def test_a_fault_is_reported_with_its_fix(seen, subject, fault, fix):
     found = faults_in(seen)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from sensor_msgs.msg import CameraInfo
+from sensor_msgs.msg import CameraInfo, Image
 
 from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.camera.camera_model import transform_from
@@ -24,6 +24,7 @@ from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from support.bags import changed_bag
 from support.masterless import masterless
+from support.ros import header_at
 
 SCENE = {'duration': 1.0, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}]}
 DEPTH, INFO = '/camera/aligned_depth_to_color/image_raw', '/camera/color/camera_info'
@@ -249,9 +250,25 @@ def test_robot10_is_not_robot1():
     assert set(seen.nodes) == {'robot1/bbox3d_node'} and seen.streams['depth'].topic == '/robot1' + DEPTH
 
 
+def observed_with(params, *messages):
+    """The Observations of a graph with these parameters of nodes, and with these (topic, message)."""
+    topics = {topic: message._type for topic, message in messages}
+    with masterless(params) as connections, mock.patch('time.sleep'), mock.patch.multiple(
+            'ros_3d_bb.nodes.common.graph_observer', published_topics=lambda: topics, publishers_of=mock.Mock()):
+        observer = GraphObserver()
+        for topic, message in messages:
+            connections.subscribers[topic].callback(message)
+        return observer.observations()
+
+
 def test_invalid_parameters_which_the_nodes_report_do_not_end_the_doctor():
-    params = {'/bbox3d_node/depth': 'registered', '/bbox3d_node/cache_length': 'long', '/tracker_node/target_frame': [1]}
-    with masterless(params), mock.patch('time.sleep'), \
-            mock.patch('ros_3d_bb.nodes.common.graph_observer.published_topics', dict):
-        seen = GraphObserver().observations()
+    seen = observed_with({'/bbox3d_node/depth': 'registered', '/bbox3d_node/cache_length': 'long'})
     assert seen.streams['depth'].topic == DEPTH and seen.cache_length_s == 1.0
+
+
+def test_unit_and_frame_of_depth_may_be_those_of_parameters():
+    depth = fill_image(Image(header=header_at(NS, 'wrong')), np.full((48, 64), 2000, np.float32), '32FC1')
+    fault = observed_with({}, (DEPTH, depth)).depth.fault
+    assert 'millimetres in a 32FC1' in fault
+    seen = observed_with({'/bbox3d_node/depth_scale': 0.001, '/bbox3d_node/frame_id': 'camera'}, (DEPTH, depth))
+    assert seen.depth.fault == '' and seen.frame_id == 'camera'

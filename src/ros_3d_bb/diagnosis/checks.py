@@ -100,8 +100,9 @@ def _alignment(seen):
     fault = size_fault(camera, depth.width, depth.height) if depth.width else ''  # _encodings reports an empty image
     if not fault and seen.depth_info is not None and not seen.depth_info.fault:
         fault = intrinsics_fault(camera, seen.depth_info.converted)
-    fault = fault or frames_fault(seen.color_info.message.header.frame_id, depth.header.frame_id) or seen.edges_fault
-    yield Finding('alignment', 'depth has the pixels and the frame of colour', fault, ALIGN)
+    of_frames = '' if seen.frame_id else frames_fault(seen.color_info.message.header.frame_id, depth.header.frame_id)
+    yield Finding('alignment', 'depth has the pixels and the frame of colour', fault or of_frames or seen.edges_fault,
+                  ALIGN)
 
 
 def _registration_fault(seen):
@@ -121,8 +122,9 @@ def _registration_fault(seen):
 def _encodings(seen):
     for subject, image, fix in (
             ('colour', seen.color, 'set the camera to rgb8 or bgr8'),
-            ('depth', seen.depth, 'correct the driver, or set depth_scale to metres per unit in config/bbox3d.yaml and '
-             'config/tracker.yaml: 1.0 for metres, 0.001 for millimetres')):
+            ('depth', seen.depth, 'correct the driver, or set depth_scale to metres per unit in config/bbox3d.yaml, '
+             'config/tracker.yaml and, for detector:=depth, config/depth_detector.yaml: 1.0 for metres, 0.001 for '
+             'millimetres')):
         if image is not None:
             fact = '%s, %d x %d pixels' % (image.message.encoding, image.message.width, image.message.height)
             yield Finding(subject + ' encoding', fact, image.fault, fix)

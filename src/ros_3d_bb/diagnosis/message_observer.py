@@ -104,11 +104,11 @@ class Observation(object):
         return TfSeen(target, source, stamp.to_sec(), links_in(transforms.all_frames_as_yaml()), fault)
 
 
-def observations_of(observed, depth_info, topics, seconds, publishers_of=lambda _topic: (), **others):
+def observations_of(observed, depth_info, topics, seconds, publishers_of=lambda _topic: (), depth_scale=0.0, **others):
     """Return the Observations of recorded messages; `topics`, `seconds` and `others` are fields of it.
 
     `observed` has an Observation for each role, `depth_info` is that of the camera_info of depth, and `publishers_of`
-    returns the publishers of a topic; it is called for silent ones.
+    returns the publishers of a topic; it is called for silent ones. `depth_scale` is as for bbox3d_node.
     """
     color_key = COLOR if others['depth_is_raw'] else DEPTH  # of the images with the intrinsics of colour
 
@@ -123,8 +123,8 @@ def observations_of(observed, depth_info, topics, seconds, publishers_of=lambda 
                         color_info=_newest(observed[INFO].newest, camera_of(color_key)),
                         depth_info=_newest(depth_info.newest, camera_of(DEPTH)),
                         color=_newest_image(observed[COLOR].newest, imgmsg_to_rgb),
-                        depth=_newest_image(observed[DEPTH].newest,
-                                            functools.partial(imgmsg_to_depth, check_unit=True)), **others)
+                        depth=_newest_image(observed[DEPTH].newest, functools.partial(
+                            imgmsg_to_depth, scale_m=depth_scale, check_unit=True)), **others)
 
 
 def observe_bag(path, name_of, target_frame, depth='aligned'):

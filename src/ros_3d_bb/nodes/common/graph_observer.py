@@ -60,12 +60,13 @@ class GraphObserver(object):
     def observations(self):
         """Return the Observations up to now."""
         self._topics.update(published_topics())
-        boxes3d = self._observed[BOXES3D].newest
+        boxes3d, frame_id = self._observed[BOXES3D].newest, self._bbox3d_param('frame_id')
         target_frame = self._target_frame or tracker_param('target_frame')
         camera_frame = tracker_param('camera_frame') or (
-            boxes3d.header.frame_id if boxes3d is not None else self._bbox3d_param('frame_id'))
+            boxes3d.header.frame_id if boxes3d is not None else frame_id)
         return observations_of(
             self._observed, self._depth_info, self._topics, time.monotonic() - self._began_s, publishers_of,
+            self._bbox3d_param('depth_scale'), frame_id=frame_id,
             tf=self._observed[DEPTH].tf_seen(self._transforms, target_frame, camera_frame),
             use_sim_time=bool(rospy.get_param('/use_sim_time', False)), clock_count=len(self._clocks),
             nodes={name: status[:2] for name, status in list(self._statuses.items())},
