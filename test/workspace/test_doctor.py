@@ -157,6 +157,19 @@ def test_a_pose_of_another_time_is_corrected_before_the_next_command(bag, tmp_pa
     assert [finding.subject for finding in found if finding.fault] == ['transforms'] and command == ''
 
 
+def without_map(topic, message):
+    if topic == '/tf':
+        message.transforms = [link for link in message.transforms if link.header.frame_id != 'map']
+    return topic, message
+
+
+@pytest.mark.parametrize('target_frame', ['', 'odom'])
+def test_people_beside_a_robot_without_localisation_are_tracked_in_its_odometry(bag, tmp_path, target_frame):
+    """The pose of a camera alone would not move with the robot."""
+    _found, command = examined(changed(bag, tmp_path, without_map), target_frame=target_frame)
+    assert '--target-frame odom' in command and '--camera' not in command
+
+
 RAW, RAW_INFO = '/front/depth/image_rect_raw', '/front/depth/camera_info'
 
 
