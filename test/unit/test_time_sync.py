@@ -112,6 +112,9 @@ SEQUENCES = {
     'boxes wait for their depth image and camera':
         ([('boxes', 2), ('depth', 1), ('depth', 2), ('camera', 2)], (0, 2, 3)),
     'the nearest camera replaces one that was lost': ([('boxes', 2), ('depth', 2), ('depth', 3)], (0, 1, 'first')),
+    'a camera is published once': ([('depth', 1), ('depth', 2), ('depth', 3), ('boxes', 3)], (3, 2, 'first')),
+    'a camera is published once, before a time jump':
+        ([('camera', 9999), ('depth', 9999), ('depth', 1), ('boxes', 1)], (3, 2, 0)),
     'the depth image was lost': ([('depth', 1), ('boxes', 2), ('depth', 3)], (1, None, None)),
     'the depth image is no longer cached': ([('depth', 1), ('depth', 40), ('boxes', 1)], (2, None, None)),
     'boxes arrive first after a pause':

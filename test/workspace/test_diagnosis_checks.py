@@ -127,8 +127,14 @@ def test_a_working_pipeline_has_no_faults_and_a_fact_of_each_check():
     assert len(found) > 14 and all(len(finding.lines) == 1 and finding.fact for finding in found)
 
 
-def test_camera_info_needs_no_stamp():
-    assert faults_in(with_stream(INFO, stamps_ns=(), lag_s=None)) == []
+@pytest.mark.parametrize('stamps_ns, lag_s', [((), None), (STAMPS[:1], 7300.0), (STAMPS[:1] * 50, 7300.0)])
+@pytest.mark.parametrize('is_bag', [False, True])
+def test_camera_info_needs_no_stamp_of_its_image(stamps_ns, lag_s, is_bag):
+    assert faults_in(with_stream(INFO, stamps_ns=stamps_ns, lag_s=lag_s)._replace(is_bag=is_bag)) == []
+
+
+def test_a_wrong_frame_that_a_parameter_replaces_is_no_fault():
+    assert faults_in(sound(depth=image_seen('16UC1', frame_id='wrong'), frame_id='optical')) == []
 
 
 @pytest.mark.parametrize('seen, subject, fault, fix', CASES)

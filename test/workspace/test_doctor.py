@@ -7,19 +7,24 @@ from unittest import mock
 import cv2
 import numpy as np
 import pytest
+import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from sensor_msgs.msg import CameraInfo
+from sensor_msgs.msg import CameraInfo, Image
 
 from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.diagnosis.checks import ROLES
+from ros_3d_bb.diagnosis.message_observer import Observation
 from ros_3d_bb.nodes.common.graph_observer import GraphObserver
 from ros_3d_bb.nodes.doctor import bag_findings, machine_findings
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from support.bags import changed_bag
 from support.masterless import masterless
+from support.ros import header_at
 
 SCENE = {'duration': 1.0, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}]}
 DEPTH, INFO = '/camera/aligned_depth_to_color/image_raw', '/camera/color/camera_info'
@@ -100,6 +105,23 @@ def test_names_of_topics_are_given_as_remappings(bag, tmp_path, monkeypatch, nam
     assert faults_in(changed(bag, tmp_path, renamed)) == []
 
 
+COLOR_RECT, DEPTH_RECT = '/camera/rgb/image_rect_color', '/camera/depth_registered/image_rect'
+
+
+def rectified(topic, message):
+    """As of a Kinect with image_proc: the camera_info is that of the raw colour images, and P that of the rectified."""
+    if topic == INFO:
+        message.K, message.D = [525, 0, 319.5, 0, 525, 239.5, 0, 0, 1], [0.2, -0.5, 0, 0, 0]
+    return {'/camera/color/image_raw': COLOR_RECT, DEPTH: DEPTH_RECT}.get(topic, topic), message
+
+
+def test_rectified_images_have_the_intrinsics_of_the_rectified_camera(bag, tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, 'argv', ['doctor', DEPTH + ':=' + DEPTH_RECT, '/camera/color/image_raw:=' + COLOR_RECT])
+    found, command = examined(changed(bag, tmp_path, rectified))
+    assert [finding for finding in found if finding.fault] == [] and 'process_bag' in command
+    assert any('focal length 615' in finding.fact for finding in found)
+
+
 def of_another_driver(topic, message):
     if topic in ('/ground_truth', '/yolo_bounding_box'):
         return '/another' + topic, message
@@ -121,6 +143,31 @@ def test_next_commands_lead_from_a_bag_to_a_picture_of_its_tracks(bag, tmp_path)
     picture = cv2.imread(str(tmp_path / 'tracked.png'))
     assert (picture == [60, 220, 40]).all(axis=2).any()  # 2D boxes in the images of that topic
     assert 'scene_report' in next_command_in('rosrun ros_3d_bb doctor tracked.bag', tmp_path)
+
+
+def with_old_tf(topic, message):
+    for transform in message.transforms if topic == '/tf' else ():
+        transform.header.stamp -= rospy.Duration(9)
+    return topic, message
+
+
+def test_a_pose_of_another_time_is_corrected_before_the_next_command(bag, tmp_path):
+    """process_bag accepts no height of the camera while tf contains its pose."""
+    found, command = examined(changed(bag, tmp_path, with_old_tf))
+    assert [finding.subject for finding in found if finding.fault] == ['transforms'] and command == ''
+
+
+def without_map(topic, message):
+    if topic == '/tf':
+        message.transforms = [link for link in message.transforms if link.header.frame_id != 'map']
+    return topic, message
+
+
+@pytest.mark.parametrize('target_frame', ['', 'odom'])
+def test_people_beside_a_robot_without_localisation_are_tracked_in_its_odometry(bag, tmp_path, target_frame):
+    """The pose of a camera alone would not move with the robot."""
+    _found, command = examined(changed(bag, tmp_path, without_map), target_frame=target_frame)
+    assert '--target-frame odom' in command and '--camera' not in command
 
 
 RAW, RAW_INFO = '/front/depth/image_rect_raw', '/front/depth/camera_info'
@@ -194,6 +241,14 @@ def test_a_missing_master_is_reported(monkeypatch, uri, fault):
     assert found.subject == 'master' and fault in found.fault and found.fix
 
 
+def test_the_rate_is_that_of_a_bag_that_is_looped():
+    """Of a second at 10 Hz, three times. The time of a message before the first /clock is 0."""
+    seen = Observation(ROLES['depth'], DEPTH)
+    for ros_ns in [0] + [NS + number % 10 * NS // 10 for number in range(30)]:
+        seen.take(DiagnosticArray(), ros_ns)
+    assert seen.stream('').rate_hz == pytest.approx(10, rel=0.15)
+
+
 def test_robot10_is_not_robot1():
     """The inputs of nodes in another namespace, in their diagnostics, are not those of this robot."""
     message = DiagnosticArray(status=[
@@ -206,3 +261,27 @@ def test_robot10_is_not_robot1():
         sleep.side_effect = lambda _s: connections.subscribers['/diagnostics'].callback(message)
         seen = GraphObserver(camera='').observations()
     assert set(seen.nodes) == {'robot1/bbox3d_node'} and seen.streams['depth'].topic == '/robot1' + DEPTH
+
+
+def observed_with(params, *messages):
+    """The Observations of a graph with these parameters of nodes, and with these (topic, message)."""
+    topics = {topic: message._type for topic, message in messages}
+    with masterless(params) as connections, mock.patch('time.sleep'), mock.patch.multiple(
+            'ros_3d_bb.nodes.common.graph_observer', published_topics=lambda: topics, publishers_of=mock.Mock()):
+        observer = GraphObserver()
+        for topic, message in messages:
+            connections.subscribers[topic].callback(message)
+        return observer.observations()
+
+
+def test_invalid_parameters_which_the_nodes_report_do_not_end_the_doctor():
+    seen = observed_with({'/bbox3d_node/depth': 'registered', '/bbox3d_node/cache_length': 'long'})
+    assert seen.streams['depth'].topic == DEPTH and seen.cache_length_s == 1.0
+
+
+def test_unit_and_frame_of_depth_may_be_those_of_parameters():
+    depth = fill_image(Image(header=header_at(NS, 'wrong')), np.full((48, 64), 2000, np.float32), '32FC1')
+    fault = observed_with({}, (DEPTH, depth)).depth.fault
+    assert 'millimetres in a 32FC1' in fault
+    seen = observed_with({'/bbox3d_node/depth_scale': 0.001, '/bbox3d_node/frame_id': 'camera'}, (DEPTH, depth))
+    assert seen.depth.fault == '' and seen.frame_id == 'camera'

@@ -106,6 +106,16 @@ def test_arguments_set_parameters_nodes_and_topics(command, expected):
     assert {key: found.get(key) for key in expected} == expected
 
 
+@pytest.mark.parametrize('cameras, prefixes', [('', ['']), ('front, rear', ['front/', 'rear/'])])
+def test_recorded_outputs_do_not_mix_with_the_current_ones(cameras, prefixes):
+    _parameters, nodes = loaded('playback.launch', 'bag:=/b.bag', 'detector:=depth', 'cameras:=' + cameras)
+    remapped = dict(nodes['player'].remap_args + [each.split(':=') for each in nodes['player'].args.split()
+                                                  if ':=' in each])
+    outputs = [prefix + topic for prefix in prefixes for topic in ('yolo_bounding_box', 'ros_3d_bb/bb_3d')]
+    outputs += ['ros_3d_bb/tracks', 'visualization_marker_array']
+    assert remapped == {topic: 'recorded/' + topic for topic in outputs}
+
+
 def test_commands_of_the_container_start_camera_and_pipeline():
     with open(os.path.join(ROOT, 'docker', 'compose.yaml')) as stream:
         services = yaml.safe_load(stream)['services']

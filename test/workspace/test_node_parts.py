@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import rospy
 from nav_msgs.msg import OccupancyGrid
-from sensor_msgs.msg import Image
+from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 from std_srvs.srv import SetBoolRequest
 
@@ -126,6 +126,24 @@ def test_a_static_map_that_is_published_once_is_no_silent_input():
         assert not list(monitor.faults())
         subscriber().get_num_connections.return_value = 0
         assert list(monitor.faults()) == [('silence on map', 'no publishers')]
+
+
+def test_a_camera_info_that_is_published_once_is_no_silent_input():
+    """Without a publisher, it is missing, for a node that is restarted."""
+    with mock.patch('rospy.Subscriber') as subscriber, mock.patch.object(subscribers, '_inputs', []) as inputs, \
+            mock.patch.object(subscribers, '_cause_of_silence', return_value='silent'), \
+            mock.patch('rospy.get_rostime', lambda: rospy.Time(1000)):
+        subscriber().get_num_connections.return_value = 1
+        subscribers.subscribe_camera_info('info', 'image', lambda _message: None)
+        monitor = subscribers.InputMonitor()
+        monitor._began_s = -100.0
+        assert list(monitor.faults()) == [('silence on info', 'silent')]
+        inputs[0].take(CameraInfo(header=Header(stamp=rospy.Time(100))))
+        assert not list(monitor.faults())
+        inputs[0].received_s = -100.0
+        assert not list(monitor.faults())
+        subscriber().get_num_connections.return_value = 0
+        assert list(monitor.faults()) == [('silence on info', 'silent')]
 
 
 def test_topics_of_dynamic_reconfigure_are_no_results():

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 NS = 1000000000  # nanoseconds in a second
 MAX_WAITING = 100  # maximum number of waiting box arrays; more than any camera sends in a second
+WITHOUT_CAMERA = 2  # images in succession without a camera_info, after which none is expected; chosen
 MAX_RATE_HZ = 300  # faster than any camera; if stamps are closer, the clock hangs and not all images are kept
 SAME_NS = NS // 200  # the stamps of one image differ by less
 JITTER = 0.05  # variation of the period of images, relative to the period
@@ -108,9 +109,10 @@ class StampSynchronizer(object):
 
     Boxes usually arrive after their depth image, by the latency of the detector. Boxes that arrive first wait for the
     depth image and the camera_info. If that camera_info is lost, the one nearest in time is used as soon as a newer
-    message shows the loss. Boxes without a stamp are matched by arrival time, to the depth image that arrived nearest
-    to `assumed_delay_ns`, an attribute, before them. A camera_info without a stamp is used for all images, because
-    intrinsics do not change with time.
+    message shows the loss; at once if the last images had none, as of a driver that sends one at its start. Boxes
+    without a stamp are matched by arrival time, to the depth image that arrived nearest to `assumed_delay_ns`, an
+    attribute, before them. A camera_info without a stamp is used for all images, because intrinsics do not change with
+    time.
 
     Images are kept, and boxes wait, for `length_ns`. The stamps of one frame differ by at most `tolerance_ns`, see
     `MessageCache.matching`. All boxes are passed to exactly one of two callbacks, in the order of arrival, by the
@@ -149,8 +151,6 @@ class StampSynchronizer(object):
         """Add a depth image; if its stamp goes back, all data from before the time jump is deleted."""
         newest_ns = self._depths.newest_ns
         if self._depths.add(stamp_ns, now_ns, depth):
-            if (self._cameras.newest_ns or 0) > stamp_ns + self._length_ns:  # no camera_info of the new time yet
-                self._cameras.clear()
             self._end_before_ns = newest_ns
             self.end(before_jump=True)
         self._match_waiting(now_ns)
@@ -211,12 +211,15 @@ class StampSynchronizer(object):
                 self._on_frame(boxes, depth, camera)
 
     def _camera_at(self, stamp_ns):
-        """The camera of the boxes, or the nearest one as soon as a newer message shows that its own is lost."""
+        """The camera of the boxes, or the nearest one as soon as no own one is expected any more."""
         if self._plain_camera is not None:
             return self._plain_camera
         camera = self._cameras.matching(stamp_ns, self._tolerance_ns)
-        if camera is None and max(self._depths.newest_ns, self._cameras.newest_ns or 0) > stamp_ns:
-            camera = self._cameras.nearest(stamp_ns, float('inf'))
+        if camera is None and self._cameras.newest_ns is not None:
+            newest_ns = self._cameras.newest_ns
+            without = sum(newest_ns < depth.stamp_ns < stamp_ns for depth in reversed(self._depths))
+            if without >= WITHOUT_CAMERA or max(self._depths.newest_ns, newest_ns) > stamp_ns:
+                camera = self._cameras.nearest(stamp_ns, float('inf'))
         return None if camera is None else camera.value
 
 

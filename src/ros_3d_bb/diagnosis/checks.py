@@ -7,10 +7,9 @@ from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault, si
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, INFO_TOPICS
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, LATEST_NS, TRACKS_TOPIC
 from ros_3d_bb.diagnosis.observations import IMAGE, KEPT, Finding, Role
-from ros_3d_bb.diagnosis.tf_tree import pose_fix, why_missing
+from ros_3d_bb.diagnosis.tf_tree import pose_fix, root_of, why_missing
 from ros_3d_bb.diagnosis.topic_faults import (LATE_S, MIN_PAIRED, MIN_RATE_HZ, NO_CLOCK, clock_fault, paired_share,
                                               silence_fault, span)
-from ros_3d_bb.pipeline.transform_buffer import path_to_root
 
 COLOR, DEPTH, INFO, BOXES2D, BOXES3D, TRACKS = 'color', 'depth', 'info', 'boxes2d', 'boxes3d', 'tracks'
 IMAGES = COLOR, DEPTH, INFO
@@ -101,8 +100,9 @@ def _alignment(seen):
     fault = size_fault(camera, depth.width, depth.height) if depth.width else ''  # _encodings reports an empty image
     if not fault and seen.depth_info is not None and not seen.depth_info.fault:
         fault = intrinsics_fault(camera, seen.depth_info.converted)
-    fault = fault or frames_fault(seen.color_info.message.header.frame_id, depth.header.frame_id) or seen.edges_fault
-    yield Finding('alignment', 'depth has the pixels and the frame of colour', fault, ALIGN)
+    of_frames = '' if seen.frame_id else frames_fault(seen.color_info.message.header.frame_id, depth.header.frame_id)
+    yield Finding('alignment', 'depth has the pixels and the frame of colour', fault or of_frames or seen.edges_fault,
+                  ALIGN)
 
 
 def _registration_fault(seen):
@@ -112,8 +112,8 @@ def _registration_fault(seen):
     if seen.depth_info is None:
         return ('there is no camera_info of the depth camera', 'record it, or remap %s to it' % DEPTH_TOPICS['raw'][1])
     color, depth = (one.message.header.frame_id.lstrip('/') for one in (seen.color_info, seen.depth))
-    parents = {frame: link.parent for frame, link in seen.tf.links.items()} if seen.tf is not None else {}
-    if path_to_root(parents, color)[-1] != path_to_root(parents, depth)[-1]:
+    links = seen.tf.links if seen.tf is not None else {}
+    if root_of(links, color) != root_of(links, depth):
         return ('tf has no transform from %s to %s, with which raw depth is registered' % (depth, color),
                 'record /tf_static of the camera driver (publish_tf:=true)')
     return ()
@@ -122,8 +122,9 @@ def _registration_fault(seen):
 def _encodings(seen):
     for subject, image, fix in (
             ('colour', seen.color, 'set the camera to rgb8 or bgr8'),
-            ('depth', seen.depth, 'correct the driver, or set depth_scale to metres per unit in config/bbox3d.yaml and '
-             'config/tracker.yaml: 1.0 for metres, 0.001 for millimetres')):
+            ('depth', seen.depth, 'correct the driver, or set depth_scale to metres per unit in config/bbox3d.yaml, '
+             'config/tracker.yaml and, for detector:=depth, config/depth_detector.yaml: 1.0 for metres, 0.001 for '
+             'millimetres')):
         if image is not None:
             fact = '%s, %d x %d pixels' % (image.message.encoding, image.message.width, image.message.height)
             yield Finding(subject + ' encoding', fact, image.fault, fix)
@@ -143,7 +144,7 @@ def _stamps(seen):
 def _stamp_fault(seen, key):
     stream = seen.streams[key]
     stamps_ns, topic = stream.stamps_ns, stream.topic
-    if not stream.count or (not stamps_ns and key == INFO):  # camera_info is used without a stamp
+    if not stream.count or (key == INFO and max(stamps_ns, default=0) < LATEST_NS):  # one is valid for all images
         return '', ''
     if not stamps_ns:
         return 'the messages on %s have no stamp (zero)' % topic, UNSTAMPED_FIX

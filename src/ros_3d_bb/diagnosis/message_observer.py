@@ -11,7 +11,8 @@ from tf2_msgs.msg import TFMessage
 from ros_3d_bb.bags.bag_reader import BagReader, message_in
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.camera.alignment import EdgeComparison, frames_fault, size_fault
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, IMAGE_KINDS, RAW, STATIC_TOPIC, TF_TOPIC, uncompressed
+from ros_3d_bb.conversions.camera_msgs import (DEPTH_TOPICS, IMAGE_KINDS, RAW, STATIC_TOPIC, TF_TOPIC, info_of_images,
+                                               uncompressed)
 from ros_3d_bb.conversions.image_msgs import DEPTH_SCALES, imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, camera_from_msg, time_from
 from ros_3d_bb.core.time_sync import NS, SAME_NS
@@ -65,13 +66,14 @@ class Observation(object):
 
     def __init__(self, role, topic):
         self.role, self.topic, self.newest, self.on_message = role, topic, None, lambda: None
-        self._count, self._first_ns, self._last_ns = 0, None, None
+        self._count, self._passed_ns, self._last_ns = 0, 0, None
         self._stamps_ns, self._lags_s = collections.deque(maxlen=KEPT), (None, None)
 
     def take(self, message, ros_ns, machine_s=None):
         """Record a message with its arrival in ROS time (0 before the first /clock message) and in machine time."""
         self._count += 1
-        self._first_ns, self._last_ns = ros_ns if self._first_ns is None else self._first_ns, ros_ns
+        self._passed_ns += max(ros_ns - (self._last_ns or ros_ns), 0)  # not from the end of a looped bag to its start
+        self._last_ns = ros_ns
         self.newest = message
         stamp_ns = _stamp_in(message)
         if stamp_ns:
@@ -81,9 +83,9 @@ class Observation(object):
         self.on_message()
 
     def stream(self, published_kind, publishers=()):
-        passed_s = (self._last_ns - self._first_ns) / NS if self._count > 1 else 0.0  # negative after a jump in time
-        return Stream(self.role, self.topic, published_kind, publishers, self._count,
-                      (self._count - 1) / passed_s if passed_s > 0 else 0.0, tuple(self._stamps_ns), *self._lags_s)
+        rate_hz = (self._count - 1) * NS / self._passed_ns if self._passed_ns else 0.0
+        return Stream(self.role, self.topic, published_kind, publishers, self._count, rate_hz, tuple(self._stamps_ns),
+                      *self._lags_s)
 
     def tf_seen(self, transforms, target_frame, source_frame=''):
         """Look up the pose of the camera in the fixed frame at the stamp of an image. None without images.
@@ -102,22 +104,27 @@ class Observation(object):
         return TfSeen(target, source, stamp.to_sec(), links_in(transforms.all_frames_as_yaml()), fault)
 
 
-def observations_of(observed, depth_info, topics, seconds, publishers_of=lambda _topic: (), **others):
+def observations_of(observed, depth_info, topics, seconds, publishers_of=lambda _topic: (), depth_scale=0.0, **others):
     """Return the Observations of recorded messages; `topics`, `seconds` and `others` are fields of it.
 
     `observed` has an Observation for each role, `depth_info` is that of the camera_info of depth, and `publishers_of`
-    returns the publishers of a topic; it is called for silent ones.
+    returns the publishers of a topic; it is called for silent ones. `depth_scale` is as for bbox3d_node.
     """
+    color_key = COLOR if others['depth_is_raw'] else DEPTH  # of the images with the intrinsics of colour
+
+    def camera_of(images):
+        return lambda message: camera_from_msg(info_of_images(message, observed[images].topic))
+
     streams = {}
     for key, one in observed.items():
         publishers = publishers_of(one.topic) if one.newest is None and one.topic in topics else ()
         streams[key] = one.stream(topics.get(one.topic, ''), publishers)
     return Observations(streams, topics, seconds,
-                        color_info=_newest(observed[INFO].newest, camera_from_msg),
-                        depth_info=_newest(depth_info.newest, camera_from_msg),
+                        color_info=_newest(observed[INFO].newest, camera_of(color_key)),
+                        depth_info=_newest(depth_info.newest, camera_of(DEPTH)),
                         color=_newest_image(observed[COLOR].newest, imgmsg_to_rgb),
-                        depth=_newest_image(observed[DEPTH].newest,
-                                            functools.partial(imgmsg_to_depth, check_unit=True)), **others)
+                        depth=_newest_image(observed[DEPTH].newest, functools.partial(
+                            imgmsg_to_depth, scale_m=depth_scale, check_unit=True)), **others)
 
 
 def observe_bag(path, name_of, target_frame, depth='aligned'):

@@ -1,11 +1,14 @@
 """The next command on the way from a bag to its tracks, and to a picture of them."""
 from shlex import quote
 
+from ros_3d_bb.camera.alignment import target_frame_fault
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, DEPTH_TOPICS, RAW, info_topic_beside
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.diagnosis.checks import COLOR, DEPTH, IMAGES, TRACKS
+from ros_3d_bb.diagnosis.tf_tree import ROBOT_FRAMES, root_of
 from ros_3d_bb.diagnosis.topic_faults import other_topic
 
+DEFAULT_TARGET = 'map'  # of process_bag and doctor
 MIN_ROLL_RAD = 0.02  # smaller ones are within the error of the fitted floor
 
 
@@ -19,6 +22,7 @@ def next_command(bag, seen, found):
     if seen.depth_is_raw and seen.depth_info_topic.lstrip('/') != DEPTH_TOPICS[RAW][1]:
         names[DEPTH_TOPICS[RAW][1]] = seen.depth_info_topic
     option = ' --depth raw' if seen.depth_is_raw else ''
+    target = '' if seen.tf is None or seen.tf.target == DEFAULT_TARGET else ' --target-frame ' + seen.tf.target
     missing = [seen.streams[key] for key in IMAGES if not seen.streams[key].count]
     used = [stream.topic for stream in seen.streams.values() if stream.count]
     used += () if seen.depth_is_raw else seen.raw_topics
@@ -37,13 +41,14 @@ def next_command(bag, seen, found):
         raw_topics = zip(DEPTH_TOPICS[RAW], (raw, info_topic_beside(raw)))
         others.update((name, topic) for name, topic in raw_topics if topic.lstrip('/') != name)
     if purpose and all(others.values()):
-        return 'rosrun ros_3d_bb doctor %s%s%s' % (quote(bag), option, _remappings(dict(names, **others))), purpose
-    if missing or faults - {'transforms', 'image rotation'}:
+        options = option + target + _remappings(dict(names, **others))
+        return 'rosrun ros_3d_bb doctor %s%s' % (quote(bag), options), purpose
+    pose = None if missing or faults - {'transforms', 'image rotation'} else _frame_and_pose(seen, target, faults)
+    if pose is None:
         return '', ''
-    pose, hint = _pose(seen.mount) if faults else ('', '')
     command = 'rosrun ros_3d_bb process_bag %s tracked.bag --detector depth%s%s%s && %s' % (
-        quote(bag), option, _remappings(names, ' --remap '), pose, report % 'tracked.bag')
-    return command, 'tracks people and draws them' + hint
+        quote(bag), option, _remappings(names, ' --remap '), pose[0], report % 'tracked.bag')
+    return command, 'tracks people and draws them' + pose[1]
 
 
 def _raw_topic(seen, is_misaligned):
@@ -52,6 +57,20 @@ def _raw_topic(seen, is_misaligned):
     if is_misaligned and depth.count and not seen.edges_fault:
         return depth.topic
     return nearest_name('/' + DEPTH_TOPICS[RAW][0], seen.raw_topics) if seen.raw_topics else ''
+
+
+def _frame_and_pose(seen, target, faults):
+    """Return the options for the frame of the tracks and the pose of the camera, and a hint; None if tf must be
+    corrected first. `target` is the option for the frame that was checked."""
+    if not faults:
+        return target, ''
+    root = root_of(seen.tf.links, seen.tf.source)
+    if root == seen.tf.target or target_frame_fault(seen.tf.target, seen.tf.source):
+        return None
+    if root in ROBOT_FRAMES:
+        return ' --target-frame ' + root, ''
+    options, hint = _pose(seen.mount)
+    return target + options, hint
 
 
 def _pose(mount):

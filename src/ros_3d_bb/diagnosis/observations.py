@@ -78,6 +78,7 @@ class Observations(NamedTuple):
     clock_count: int = 0  # number of /clock messages
     nodes: dict = {}  # {name: (level, sentence)} from the diagnostics of nodes
     mount: Any = None  # camera_mount.CameraMount of a camera without the pose in tf
+    frame_id: str = ''  # of bbox3d_node, which replaces that of the images; empty: none
     depth_is_raw: bool = False  # not aligned to colour; the nodes register it
     raw_topics: Tuple[str, ...] = ()  # topics of a bag with depth images that are not aligned to colour
     depth_info_topic: str = ''  # of the camera_info of depth

@@ -31,6 +31,11 @@ def links_in(text):
             for frame, entry in entries.items()}
 
 
+def root_of(links, frame):
+    """The root of the tree of a frame; `links` is {frame: Link}."""
+    return path_to_root({child: link.parent for child, link in links.items()}, frame)[-1]
+
+
 def why_missing(links, target, source, stamp_s):
     """Explain why there is no transform from the camera's frame `source` to the fixed frame `target` of the tracks.
 

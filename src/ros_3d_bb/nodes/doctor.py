@@ -12,14 +12,12 @@ import rospy
 
 from ros_3d_bb.bags.bag_reader import BagError
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, absolute
-from ros_3d_bb.core.params import params_from
 from ros_3d_bb.diagnosis.checks import findings
 from ros_3d_bb.diagnosis.message_observer import observe_bag
 from ros_3d_bb.diagnosis.next_command import next_command
 from ros_3d_bb.diagnosis.observations import Finding
 from ros_3d_bb.nodes.common.graph_observer import GraphObserver, name_for, tracker_param
 from ros_3d_bb.nodes.common.master import NO_ANSWER, TIMEOUT_S, patient_master
-from ros_3d_bb.pipeline.tracking_stage import TrackerNodeParams
 
 LOCAL = 'localhost', '127.0.0.1', '127.0.1.1', '::1'
 EXPORT_IP = 'export ROS_IP with the address by which other machines reach this one, '
@@ -75,7 +73,7 @@ def graph_findings(arguments):
     shutdown = threading.Event()
     rospy.on_shutdown(shutdown.set)  # on Ctrl-C, because rospy handles the signal itself
     while True:
-        cameras = tracked_cameras()
+        cameras = [str(camera) for camera in tracker_param('cameras')] or ['']  # '': a single one
         camera = arguments.camera or cameras[0]
         observer = GraphObserver(arguments.target_frame, camera)
         if shutdown.wait(arguments.seconds):
@@ -87,16 +85,6 @@ def graph_findings(arguments):
                                     % (camera, ', '.join(cameras))))
         if not any(finding.fault for finding in found) or time.monotonic() >= deadline_s:
             return found
-
-
-def tracked_cameras():
-    """Return the list of namespaces of the tracker's cameras; [''] for a single camera."""
-    given = tracker_param('cameras')
-    try:
-        tracker, = params_from({'cameras': given} if given else {}, TrackerNodeParams)
-    except ValueError:  # reported by the tracker itself
-        return ['']
-    return [str(camera) for camera in tracker.cameras] or ['']
 
 
 def machine_findings():

@@ -1,4 +1,5 @@
 """Observe the topics of a running ROS graph for some seconds, as input of the checks."""
+import contextlib
 import time
 
 import rospy
@@ -10,6 +11,7 @@ from sensor_msgs.msg import CameraInfo
 
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, RAW, info_topic_beside, topic_of
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC
+from ros_3d_bb.core.params import params_from
 from ros_3d_bb.diagnosis.checks import BOXES3D, COLOR, DEPTH, ROLES
 from ros_3d_bb.diagnosis.message_observer import EdgeObserver, Observation, observations_of
 from ros_3d_bb.nodes.common.master import published_topics, publishers_of
@@ -58,12 +60,13 @@ class GraphObserver(object):
     def observations(self):
         """Return the Observations up to now."""
         self._topics.update(published_topics())
-        boxes3d = self._observed[BOXES3D].newest
+        boxes3d, frame_id = self._observed[BOXES3D].newest, self._bbox3d_param('frame_id')
         target_frame = self._target_frame or tracker_param('target_frame')
         camera_frame = tracker_param('camera_frame') or (
-            boxes3d.header.frame_id if boxes3d is not None else self._bbox3d_param('frame_id'))
+            boxes3d.header.frame_id if boxes3d is not None else frame_id)
         return observations_of(
             self._observed, self._depth_info, self._topics, time.monotonic() - self._began_s, publishers_of,
+            self._bbox3d_param('depth_scale'), frame_id=frame_id,
             tf=self._observed[DEPTH].tf_seen(self._transforms, target_frame, camera_frame),
             use_sim_time=bool(rospy.get_param('/use_sim_time', False)), clock_count=len(self._clocks),
             nodes={name: status[:2] for name, status in list(self._statuses.items())},
@@ -72,7 +75,7 @@ class GraphObserver(object):
             cache_length_s=self._bbox3d_param('cache_length'))
 
     def _bbox3d_param(self, name):
-        return _param(topic_of(self._camera, 'bbox3d_node'), name, Bbox3dParams())
+        return _param(topic_of(self._camera, 'bbox3d_node'), name, Bbox3dParams)
 
     def _topic_of(self, name):
         """Return the name of a topic of the nodes in this graph."""
@@ -104,9 +107,14 @@ def name_for(camera, topic):
 
 
 def tracker_param(name):
-    """Return a parameter of the tracker, or its default if it is not set."""
-    return _param('tracker_node', name, TrackerNodeParams())
+    """Return a parameter of the tracker, see `_param`."""
+    return _param('tracker_node', name, TrackerNodeParams)
 
 
-def _param(node, name, defaults):
-    return rospy.get_param(rospy.resolve_name('%s/%s' % (node, name)), getattr(defaults, name))
+def _param(node, name, kind):
+    """Return a parameter of a node, or its default if it is not set, or invalid, which the node itself reports."""
+    value = rospy.get_param(rospy.resolve_name('%s/%s' % (node, name)), None)
+    params = kind()
+    with contextlib.suppress(ValueError):
+        params, = params_from({name: value}, kind)
+    return getattr(params, name)

@@ -28,7 +28,7 @@ class Input(object):
     """Statistics of the messages received on a topic of the node."""
 
     def __init__(self, name, kind, is_irregular=False):
-        self.name, self._kind, self.callbacks, self.subscriber = name, kind, [], None
+        self.name, self.kind, self.callbacks, self.subscriber = name, kind, [], None
         self.is_irregular = is_irregular
         self.count, self.received_s, self._newest = 0, None, None  # `received_s` on time.monotonic()
         self.reported_count = 0  # at the last report of the rate
@@ -60,7 +60,7 @@ class Input(object):
         """Return the statistics as a Stream. Lags are unknown without a stamp, and before the first /clock message."""
         stamp, ros_time, machine_s = self._newest or (None, None, None)
         has_lag = bool(stamp and ros_time)
-        return Stream(role_named(self.name, self._kind._type), self.subscriber.resolved_name, count=self.count,
+        return Stream(role_named(self.name, self.kind._type), self.subscriber.resolved_name, count=self.count,
                       lag_s=ros_time.to_sec() - stamp.to_sec() if has_lag else None,
                       machine_lag_s=machine_s - stamp.to_sec() if has_lag else None)
 
@@ -132,6 +132,8 @@ class InputMonitor(object):
         for each in inputs():
             if each.is_irregular and (each.count or each.subscriber.get_num_connections()):
                 continue
+            if each.kind is CameraInfo and each.count and each.subscriber.get_num_connections():
+                continue  # one is valid for all images
             silent_s = now_s - (each.received_s or self._began_s)
             if silent_s > SILENT_S:
                 yield 'silence on ' + each.name, self._silence(each, now_s, silent_s)
