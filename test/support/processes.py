@@ -5,8 +5,6 @@ import os
 import signal
 import socket
 import struct
-import subprocess
-import sys
 import time
 from xmlrpc.client import Fault, ServerProxy
 
@@ -55,19 +53,6 @@ def hanging(node):
 
 
 @contextlib.contextmanager
-def starved(at_once):
-    """This many processes for each core run endless loops."""
-    busy = [subprocess.Popen([sys.executable, '-c', 'while True: pass']) for _ in range(at_once * os.cpu_count())]
-    try:
-        yield
-    finally:
-        for process in busy:
-            process.kill()
-        for process in busy:
-            process.wait()
-
-
-@contextlib.contextmanager
 def never_reading(node, topic, kind):
     """A node has a subscriber that never reads from its connection."""
     uri = rospy.get_master().lookupNode(node)[2]
@@ -81,13 +66,3 @@ def never_reading(node, topic, kind):
         wait_until(lambda: any(entry[1] == '/subscriber' and entry[4] == topic for entry in ServerProxy(uri).getBusInfo(
             '/subscriber')[2]), 'the connection of a subscriber of ' + topic)
         yield
-
-
-def end(roslaunch):
-    """Terminate roslaunch with its nodes."""
-    roslaunch.send_signal(signal.SIGINT)
-    try:
-        roslaunch.wait(30)
-    except subprocess.TimeoutExpired:
-        roslaunch.kill()
-        roslaunch.wait()

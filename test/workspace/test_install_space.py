@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from ros_3d_bb_lab.evaluation.launching import free_port
+from ros_3d_bb_lab.evaluation.launching import free_port, running
 from support.small_session import write_small_session
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
@@ -69,11 +69,8 @@ def test_launch_config_rviz_and_scripts_are_installed(installed):
 @pytest.fixture(scope='module')
 def master():
     port = str(free_port())
-    process = subprocess.Popen(['rosmaster', '--core', '-p', port], stdout=subprocess.DEVNULL,
-                               stderr=subprocess.DEVNULL)
-    yield 'http://localhost:' + port
-    process.terminate()
-    process.wait()
+    with running(['rosmaster', '--core', '-p', port], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL):
+        yield 'http://localhost:' + port
 
 
 @pytest.mark.parametrize('name', NODES)

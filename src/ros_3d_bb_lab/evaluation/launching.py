@@ -1,4 +1,4 @@
-"""Launch files in benchmarks: on a ROS master of their own, and terminated in any case."""
+"""Launch files and other programs, which are ended in any case."""
 import contextlib
 import os
 import signal
@@ -16,15 +16,19 @@ def launch(name, arguments, timeout_s, log):
         process.wait(timeout_s)
 
 
-@contextlib.contextmanager
 def running_roslaunch(arguments, port, log):
-    """Context in which roslaunch runs with its own master. Its nodes are terminated in any case.
+    """Context in which roslaunch runs with its own master."""
+    return running(['roslaunch', '-p', str(port)] + arguments, stdout=log, stderr=subprocess.STDOUT,
+                   env=dict(os.environ, ROS_MASTER_URI='http://localhost:%d' % port))
 
-    roslaunch runs in a separate session, so that a Ctrl-C in the terminal reaches it only once, through this function.
+
+@contextlib.contextmanager
+def running(command, **options):
+    """Context in which a program runs, with options of Popen. At the end, it gets a Ctrl-C, and is then killed.
+
+    It runs in a separate session, so that a Ctrl-C in the terminal reaches it only once, through this function.
     """
-    process = subprocess.Popen(['roslaunch', '-p', str(port)] + arguments, stdout=log, stderr=subprocess.STDOUT,
-                               start_new_session=True,
-                               env=dict(os.environ, ROS_MASTER_URI='http://localhost:%d' % port))
+    process = subprocess.Popen(command, start_new_session=True, **options)
     try:
         yield process
     finally:
