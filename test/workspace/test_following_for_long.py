@@ -15,8 +15,7 @@ from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import CameraView
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL
-from ros_3d_bb_lab.evaluation.scene_benchmark import depth_detector
-from ros_3d_bb_lab.evaluation.scenes import detections_in
+from ros_3d_bb_lab.evaluation.scene_benchmark import depth_detector, detections_in
 from ros_3d_bb_lab.simulation.driven_world import DrivenWorld
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import Simulator

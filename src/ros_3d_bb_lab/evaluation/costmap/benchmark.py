@@ -27,8 +27,7 @@ from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb_lab.evaluation.costmap.costmap_score import Costmap, Sighting, score_costmaps
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, add_scenarios, describe_machine, scene_name
 from ros_3d_bb_lab.evaluation.launching import free_port, running_roslaunch
-from ros_3d_bb_lab.evaluation.scene_benchmark import RANGE_M, depth_detector, yolov5_detector
-from ros_3d_bb_lab.evaluation.scenes import run_scene
+from ros_3d_bb_lab.evaluation.scene_benchmark import RANGE_M, depth_detector, run_scene, yolov5_detector
 from ros_3d_bb_lab.evaluation.text_table import line_of
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import BASE_FRAME, MAP_FRAME, ODOM_FRAME
 from ros_3d_bb_lab.simulation.scenario import read_scenario
@@ -55,7 +54,7 @@ LAUNCH = """<launch>
 
 
 class Scene(NamedTuple):
-    """A tracked scene: its name, the Simulator, a Step per image (`scenes.Step`), and the range of the detector."""
+    """A tracked scene: its name, the Simulator, a `scene_benchmark.Step` per image, and the range of the detector."""
 
     name: str
     simulator: Simulator

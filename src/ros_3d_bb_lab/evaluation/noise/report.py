@@ -6,9 +6,8 @@ import numpy as np
 from ros_3d_bb.estimation.error_model import write_error_model
 from ros_3d_bb.sessions.plausibility import position_text
 from ros_3d_bb_lab.evaluation.html_report import figure, heading, html_report, paragraph, table
-from ros_3d_bb_lab.evaluation.noise.analysis import summary_of
+from ros_3d_bb_lab.evaluation.noise.analysis import LEAST_TO_TEST, summary_of
 from ros_3d_bb_lab.evaluation.noise.figures import polynomial_text, write_figures
-from ros_3d_bb_lab.evaluation.noise.statistics import LEAST_TO_TEST
 from ros_3d_bb_lab.evaluation.noise.tables import LEAST_IN_CLUSTER, small_clusters
 
 TITLE = 'Position errors of a depth camera'
