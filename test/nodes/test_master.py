@@ -20,7 +20,8 @@ from ros_3d_bb.nodes.common.master import Registration, on_new_master
 from ros_3d_bb.nodes.viewer_node import Label
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb_lab.evaluation.launching import free_port
-from support.processes import killed_and_back, pid_of
+from ros_3d_bb_lab.evaluation.latency.latency_probe_node import pid_of
+from support.processes import killed_and_back
 from support.ros import TIMEOUT_S, Recorder, launched, wait_until
 from support.stage import RECOVERY_IMAGES, Stage
 

@@ -19,10 +19,10 @@ from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb_lab.evaluation.launching import running
+from ros_3d_bb_lab.evaluation.latency.latency_probe_node import pid_of
 from ros_3d_bb_lab.simulation.driven_world import moved
 from ros_3d_bb_lab.simulation.simulator import upright
 from support.planner_definitions import message_class
-from support.processes import pid_of
 from support.real_planners import ROOT, planner_environment
 from support.ros import Recorder, header_at, wait_until
 from support.two_cameras import boxes

@@ -6,10 +6,11 @@ import signal
 import socket
 import struct
 import time
-from xmlrpc.client import Fault, ServerProxy
+from xmlrpc.client import ServerProxy
 
 import rospy
 
+from ros_3d_bb_lab.evaluation.latency.latency_probe_node import pid_of
 from support.ros import TIMEOUT_S, wait_until
 
 
@@ -20,15 +21,6 @@ def processes_naming(text):
         with contextlib.suppress(OSError), open(path) as stream:  # a process may have ended
             found += text in stream.read()
     return found
-
-
-def pid_of(node):
-    """The process of a node; None if it does not respond."""
-    code, _status, uri = rospy.get_master().lookupNode(node)
-    try:
-        return ServerProxy(uri).getPid(rospy.get_name())[2] if code == 1 else None
-    except (OSError, Fault):
-        return None
 
 
 def killed_and_back(node, meanwhile):

@@ -32,11 +32,10 @@ def running(command, **options):
     try:
         yield process
     finally:
-        process.send_signal(signal.SIGINT)  # has no effect if it has exited
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(ENDING_S)
-        process.kill()
-        process.wait()
+        for number, timeout_s in (signal.SIGINT, ENDING_S), (signal.SIGKILL, None):
+            with contextlib.suppress(ProcessLookupError, subprocess.TimeoutExpired):
+                os.killpg(process.pid, number)
+                process.wait(timeout_s)
 
 
 def free_port():
