@@ -100,7 +100,8 @@ class NavigationTrialNode(object):
     def __init__(self):
         self._params, = read_params(NavigationTrialParams)
         self._scenario = read_scenario(self._params.scenario)
-        self._pace, self._costmap_seen, self._cameras = Pace(), False, {}
+        self._pace, self._cameras = Pace(), {}
+        self._sources = []  # names of the inputs of move_base for which the time waits
         self._pose, self._speeds_mps, self._clearances_m = None, [], []
         self._collisions, self._driving_collisions = 0, 0
         self._map_pub = rospy.Publisher('map', OccupancyGrid, queue_size=1, latch=True)
@@ -111,7 +112,8 @@ class NavigationTrialNode(object):
         rospy.Subscriber('clearance', Float32, lambda message: self._clearances_m.append(message.data))
         rospy.Subscriber('collisions', UInt32, self._on_collisions)
         rospy.Subscriber('cmd_vel', Twist, lambda _message: self._pace.heard('commands', self._now_ns()))
-        rospy.Subscriber('move_base/local_costmap/costmap', OccupancyGrid, self._on_costmap)
+        rospy.Subscriber('move_base/local_costmap/costmap', OccupancyGrid,
+                         lambda _message: self._pace.heard('costmap', self._now_ns()))
         if self._params.tracks:
             self._wait_for('tracks', TRACKS_TOPIC, TrackedObjectArray)
         if self._params.boxes:
@@ -122,13 +124,16 @@ class NavigationTrialNode(object):
             self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=10)
             rospy.Subscriber(TRUTH_TOPIC, TrackedObjectArray, self._publish_visible)
         if self._params.scan:
+            self._sources.append('scan')
             self._scan_pub = rospy.Publisher('scan', LaserScan, queue_size=10)
             rospy.Subscriber(TRUTH_TOPIC, TrackedObjectArray, self._publish_scan)
         if self._params.cloud:
+            self._sources.append('cloud')
             for mount in self._scenario.robot.mounts:
                 self._convert_depth_of(mount.name)
 
     def _wait_for(self, source, topic, kind):
+        self._sources.append(source)
         rospy.Subscriber(topic, kind, lambda message: self._pace.heard(source, message.header.stamp.to_nsec()))
 
     def _convert_depth_of(self, camera):
@@ -151,10 +156,10 @@ class NavigationTrialNode(object):
             rospy.logfatal('move_base, tracker or camera did not start within %.0f s; there is no result',
                            START_TIMEOUT_S)
             return
-        start_ns, sources = self._now_ns(), self._sources()
+        start_ns = self._now_ns()
         self._speeds_mps, self._clearances_m = [], []
         self._goal_pub.publish(goal_message(self._params, time_from(start_ns)))
-        self._pace.start(start_ns, ['commands'] + sources)
+        self._pace.start(start_ns, ['commands'] + self._sources)
         time_to_goal_s = self._drive(start_ns)
         if rospy.is_shutdown():
             return  # interrupted: there is no result
@@ -164,18 +169,12 @@ class NavigationTrialNode(object):
         with open(self._params.record, 'w') as stream:
             json.dump(result, stream)
 
-    def _sources(self):
-        """Names of the inputs of move_base for which the time waits."""
-        cameras = self._scenario.robot.mounts if self._params.boxes else ()
-        return ([name for name in ('tracks', 'cloud', 'scan') if getattr(self._params, name)]
-                + ['boxes ' + mount.name for mount in cameras])
-
     def _started(self):
         """Wait until everything runs. Returns whether it does."""
         deadline_s, ready_ns = time.monotonic() + START_TIMEOUT_S, None
-        wanted = set(self._sources())
+        wanted = {'costmap', *self._sources}
         while time.monotonic() < deadline_s and not rospy.is_shutdown():
-            is_ready = (self._costmap_seen and self._pose is not None and wanted <= self._pace.sources
+            is_ready = (wanted <= self._pace.sources and self._pose is not None
                         and self._goal_pub.get_num_connections() and self._limit_pub.get_num_connections())
             ready_ns = (ready_ns or self._now_ns()) if is_ready else None
             if is_ready and self._now_ns() > ready_ns + WARM_UP_S * NS:
@@ -210,9 +209,6 @@ class NavigationTrialNode(object):
         if message.data > self._collisions:
             self._driving_collisions += was_driving(self._speeds_mps)
         self._collisions = message.data
-
-    def _on_costmap(self, _message):
-        self._costmap_seen = True
 
     def _on_depth(self, camera, cloud_pub, message):
         if camera in self._cameras:
