@@ -50,19 +50,18 @@ def run_scene(simulator, detect, every=1, error_model=None):
     for number in range(0, simulator.frame_count, every):
         frame = simulator.frame(number)
         detected = detect(frame)
-        depth = DepthImage(frame.depth_mm, 0.001)
         stamp_ns = int(round(frame.time_s * NS))
         people = [track for track in simulator.true_tracks(frame, stamp_ns) if track.label == PERSON]
-        detections = detections_in(depth, detected, simulator.camera, frame.poses.map_from_camera, error_model)
-        view = CameraView(frame.poses.map_from_camera, simulator.camera, frame.camera,
-                          functools.partial(depths_towards, simulator.camera, depth))
-        tracks = tracker.update(stamp_ns, detections, view)
+        tracks = track_frame(tracker, frame, detected, stamp_ns, simulator.camera, error_model)
         steps.append(Step(frame._replace(color=None, depth_mm=None), detected.boxes, Moment(stamp_ns, people, tracks)))
     return steps
 
 
-def detections_in(depth, detected, camera, map_from_camera, error_model):
-    """Convert 2D detections to detections in the map, as bbox3d_node and tracker_node do."""
+def track_frame(tracker, frame, detected, stamp_ns, camera, error_model):
+    """Update a Tracker with the 2D detections in a SimulatedFrame, as bbox3d_node and tracker_node do. Returns the
+    tracks.
+    """
+    depth, map_from_camera = DepthImage(frame.depth_mm, 0.001), frame.poses.map_from_camera
     rects_px = np.rint(detected.boxes).astype(int)
     usable = (rects_px[:, :2] < rects_px[:, 2:]).all(axis=1)
     estimated = estimate_boxes(depth, list(map(tuple, rects_px[usable].tolist())), camera,
@@ -70,7 +69,8 @@ def detections_in(depth, detected, camera, map_from_camera, error_model):
                                level_from_camera=level_rotation(map_from_camera[2, :3]))
     found = corrected_boxes([box._replace(score=score) for box, score in zip(estimated, detected.scores[usable])
                              if plausible(box)], error_model)
-    return detections_from_boxes(dict(enumerate(found)), map_from_camera)
+    view = CameraView(map_from_camera, camera, frame.camera, functools.partial(depths_towards, camera, depth))
+    return tracker.update(stamp_ns, detections_from_boxes(dict(enumerate(found)), map_from_camera), view)
 
 
 def depth_detector(simulator):
