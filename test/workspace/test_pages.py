@@ -19,9 +19,6 @@ from ros_3d_bb.core.params import SET_BY_LAUNCH, table_of
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.people_node import PeopleNode
 from ros_3d_bb.nodes.realsense_node import RealSenseNode
-from ros_3d_bb_lab.evaluation.latency.latency_probe_node import LatencyProbeNode
-from ros_3d_bb_lab.evaluation.latency.replay_node import ReplayNode
-from ros_3d_bb_lab.evaluation.navigation.navigation_trial_node import NavigationTrialNode
 from ros_3d_bb_lab.simulation.ros.simulator_node import SimulatorNode
 from support.code_blocks import PAGES
 from support.masterless import masterless
@@ -30,17 +27,14 @@ from support.planner_definitions import package
 
 CONFIG = node_pages.config_files()
 NODES = {node.name: node for node in node_pages.nodes()}
+USED = set(name for name, node in NODES.items() if 'evaluation' not in node.node_class.__module__)  # not by benchmarks
 SCENARIO = os.path.join(ROOT, 'config', 'scenarios', 'empty_room.yaml')
 # Parameters with which nodes connect to all their topics; the other nodes are created as by the fuzzer.
 MORE_PARAMS = {'planner_bridge_node': {'outputs': 'costmap, people, teb, mpc, vision'},
                'tracker_node': {'use_map': True}, 'speed_limit_node': {'use_scan': True},
-               'realsense_node': {'publish_clock': True}, 'replay_node': {'boxes': True},
-               'navigation_trial_node': dict(scenario=SCENARIO, tracks=True, boxes=True, cloud=True, visible=True,
-                                             scan=True),
+               'realsense_node': {'publish_clock': True},
                'simulator_node': {'scenario': SCENARIO, 'drive': True, 'boxes': True, 'supervised': True}}
-OTHERS = {'realsense_node': RealSenseNode, 'replay_node': ReplayNode, 'simulator_node': SimulatorNode,
-          'latency_probe_node': LatencyProbeNode, 'navigation_trial_node': NavigationTrialNode,
-          'people_node': PeopleNode}
+OTHERS = {'realsense_node': RealSenseNode, 'simulator_node': SimulatorNode, 'people_node': PeopleNode}
 OPTIONAL_PACKAGES = 'people_msgs', 'costmap_converter', 'derived_object_msgs', 'vision_msgs'
 
 
@@ -53,8 +47,7 @@ def connected(name):
     else:
         params, make = TARGETS[name].params, functools.partial(TARGETS[name].make, None)
     with masterless(dict(params, **MORE_PARAMS.get(name, {}))) as connections, \
-            mock.patch.dict(sys.modules, stand_ins), mock.patch('threading.Thread.start'), \
-            mock.patch('ros_3d_bb_lab.evaluation.latency.replay_node.images_in', lambda _path, _topics: []):
+            mock.patch.dict(sys.modules, stand_ins), mock.patch('threading.Thread.start'):
         node = make()
         send_image(connections, NS)
         yield node, connections
@@ -67,7 +60,7 @@ def documented(name, section):
 
 def test_each_node_has_a_script():
     scripts = set(name for name in os.listdir(os.path.join(ROOT, 'scripts')) if name.endswith('_node'))
-    assert set(NODES) == scripts == set(TARGETS) | set(OTHERS)
+    assert set(NODES) == scripts and USED == set(TARGETS) | set(OTHERS)
 
 
 @pytest.mark.parametrize('path', sorted(CONFIG))
@@ -78,7 +71,7 @@ def test_parameter_files_are_up_to_date(path):
 
 @pytest.mark.parametrize('name', [pytest.param(name, marks=pytest.mark.needs('pyrealsense2'))
                                   if name == 'realsense_node' else name
-                                  for name in sorted(set(NODES) - {'people_node'})])  # which connects as its parts do
+                                  for name in sorted(USED - {'people_node'})])  # which connects as its parts do
 def test_a_node_connects_to_the_topics_and_services_of_its_docstring(name):
     with connected(name) as (node, connections), mock.patch('rospy.ServiceProxy') as proxy:
         for section, found in (('Subscribes', connections.subscribers), ('Publishes', connections.publishers)):

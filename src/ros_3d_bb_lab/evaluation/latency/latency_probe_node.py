@@ -40,19 +40,6 @@ class LatencyProbeNode(object):
 
     Afterwards the node writes the record and exits. Parameters: see `LatencyProbeParams`; launch/latency.launch. Format
     of the record: see `ros_3d_bb_lab.evaluation.latency.latency_result.result_of`.
-
-    Subscribes
-    ----------
-    camera/color/camera_info : sensor_msgs/CameraInfo
-        Represents the images.
-    yolo_bounding_box : std_msgs/Int32MultiArray
-        2D boxes.
-    ros_3d_bb/bb_3d : ros_3d_bb/BoundingBox3DArray
-        3D boxes.
-    ros_3d_bb/tracks : ros_3d_bb/TrackedObjectArray
-        Tracks.
-    visualization_marker_array : visualization_msgs/MarkerArray
-        Markers.
     """
 
     def __init__(self):

@@ -55,46 +55,6 @@ class NavigationTrialNode(object):
     The node controls the time of the simulator: it is at most 0.2 s ahead of the newest inputs that tracker and planner
     have processed, so that they keep up on a slow machine, too. Parameters: see
     `NavigationTrialParams`; launch/navigation_benchmark.launch.
-
-    Subscribes
-    ----------
-    /tf : tf2_msgs/TFMessage
-        True pose of the robot, from the simulator.
-    odom : nav_msgs/Odometry
-        Speed of the robot.
-    clearance : std_msgs/Float32
-        Distance to the nearest person.
-    collisions : std_msgs/UInt32
-        Number of collisions.
-    cmd_vel : geometry_msgs/Twist
-        Commands of move_base, which show how far it has got.
-    ros_3d_bb/tracks : ros_3d_bb/TrackedObjectArray
-        Tracks, which show how far the tracker has got; only with ~tracks.
-    ros_3d_bb/bb_3d : ros_3d_bb/BoundingBox3DArray
-        3D boxes of each camera of the scenario, which show how far its nodes have got; only with ~boxes.
-    camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
-        Depth images of each camera of the scenario; only with ~cloud.
-    camera/aligned_depth_to_color/camera_info : sensor_msgs/CameraInfo
-        Their intrinsics; only with ~cloud.
-    ground_truth : ros_3d_bb/TrackedObjectArray
-        True people, from the simulator; only with ~visible or ~scan.
-    move_base/local_costmap/costmap : nav_msgs/OccupancyGrid
-        Shows that move_base has started.
-
-    Publishes
-    ---------
-    map : nav_msgs/OccupancyGrid
-        Walls and furniture of the scene, latched.
-    move_base_simple/goal : geometry_msgs/PoseStamped
-        Goal in the map.
-    camera/points : sensor_msgs/PointCloud2
-        Points of the depth images of each camera; only with ~cloud.
-    ros_3d_bb/tracks : ros_3d_bb/TrackedObjectArray
-        True tracks of the people in view of a camera; only with ~visible.
-    scan : sensor_msgs/LaserScan
-        Scan of an ideal laser at the centre of the robot; only with ~scan.
-    simulator_node/time_limit : std_msgs/Time
-        Time that the simulator does not exceed.
     """
 
     def __init__(self):
