@@ -1,5 +1,6 @@
 """Launch files and other programs, which are ended in any case."""
 import contextlib
+import json
 import os
 import signal
 import socket
@@ -8,18 +9,30 @@ import subprocess
 ENDING_S = 40.0  # roslaunch waits up to 17 s for its nodes
 
 
-def launch(name, arguments, timeout_s, log):
-    """Run a launch file of the package, with a dictionary of arguments, until it exits or times out."""
-    command = ['ros_3d_bb', name] + ['%s:=%s' % item for item in arguments.items()]
-    with running_roslaunch(command, free_port(), log) as process, \
-            contextlib.suppress(subprocess.TimeoutExpired):  # the caller reports the missing result
-        process.wait(timeout_s)
+def recorded(name, arguments, path, timeout_s):
+    """Run a launch file of the package, with a dictionary of arguments, until it exits or times out, unless it was run
+    before. Returns what it has recorded in `path`.json.
+
+    Raises RuntimeError, with the end of the log, if it has not.
+    """
+    if not os.path.exists(path + '.json'):
+        command = ['ros_3d_bb', name] + ['%s:=%s' % item for item in dict(arguments, record=path + '.json').items()]
+        with open(path + '.log', 'w') as log, running_roslaunch(command, free_port(), log) as process, \
+                contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(timeout_s)
+    try:
+        with open(path + '.json') as stream:
+            return json.load(stream)
+    except OSError:
+        with open(path + '.log') as stream:
+            end = stream.read()[-3000:]
+        raise RuntimeError('%s: no result. The end of the log:\n%s' % (os.path.basename(path), end))
 
 
-def running_roslaunch(arguments, port, log):
-    """Context in which roslaunch runs with its own master."""
+def running_roslaunch(arguments, port, log, **options):
+    """Context in which roslaunch runs with its own master, and options of Popen."""
     return running(['roslaunch', '-p', str(port)] + arguments, stdout=log, stderr=subprocess.STDOUT,
-                   env=dict(os.environ, ROS_MASTER_URI='http://localhost:%d' % port))
+                   env=dict(os.environ, ROS_MASTER_URI='http://localhost:%d' % port), **options)
 
 
 @contextlib.contextmanager
