@@ -1,7 +1,6 @@
 """Latency of the complete pipeline, from the image stamp to the markers, by detector and CPU load."""
 import contextlib
 import os
-import signal
 import subprocess
 import sys
 import tempfile
@@ -83,7 +82,6 @@ def print_result(result):
 def run(arguments):
     """Measure each case."""
     cases = _cases(arguments)
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # runs the cleanup, which ends all processes
     print(describe_machine(), flush=True)
     results = []
     with tempfile.TemporaryDirectory() as folder:

@@ -1,8 +1,6 @@
 """Closed loop: move_base drives a simulated robot among people, with different knowledge of them."""
 import argparse
 import os
-import signal
-import sys
 import tempfile
 
 import yaml
@@ -41,7 +39,6 @@ def run(arguments):
     """Run all trials."""
     if arguments.detector not in (TRUE_BOXES, 'depth') and not os.path.isfile(arguments.detector):
         raise ValueError('--detector %s: exact, depth or the path of a file expected' % arguments.detector)
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # runs the cleanup, which ends all processes
     print(describe_machine(), flush=True)
     trials = []
     with tempfile.TemporaryDirectory() as folder:
