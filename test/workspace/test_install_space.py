@@ -16,25 +16,19 @@ NODES = [name for name in PROGRAMS if name.endswith('_node')]
 FOLDERS = ('launch', 'config', 'examples', 'rviz', 'msg', 'urdf')
 
 
-def built(tmp_path_factory, *options, **environment):
-    """Build and install a copy of the sources with cmake. Returns the deleted source and build folders."""
-    source, build = str(tmp_path_factory.mktemp('source') / 'ros_3d_bb'), str(tmp_path_factory.mktemp('build'))
+@pytest.fixture(scope='module')
+def installed(tmp_path_factory):
+    prefix, source, build = (str(tmp_path_factory.mktemp(name) / 'ros_3d_bb') for name in ('prefix', 'source', 'build'))
     shutil.copytree(ROOT, source, ignore=shutil.ignore_patterns('.git', '__pycache__'))
+    os.mkdir(build)
     layout = 'ON' if sys.base_prefix == '/usr' else 'OFF'  # of Debian's own Python
-    for command in (['cmake', source, '-DPYTHON_EXECUTABLE=' + sys.executable, '-DSETUPTOOLS_DEB_LAYOUT=' + layout]
-                    + list(options), ['make', '-j2', 'install']):
-        result = subprocess.run(command, cwd=build, env=dict(os.environ, **environment), stdout=subprocess.PIPE,
-                                stderr=subprocess.STDOUT)
+    for command in (['cmake', source, '-DCMAKE_INSTALL_PREFIX=' + prefix, '-DCATKIN_ENABLE_TESTING=OFF',
+                     '-DPYTHON_EXECUTABLE=' + sys.executable, '-DSETUPTOOLS_DEB_LAYOUT=' + layout],
+                    ['make', '-j2', 'install']):
+        result = subprocess.run(command, cwd=build, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         assert result.returncode == 0, result.stdout.decode()
     shutil.rmtree(source)
     shutil.rmtree(build)
-    return source, build
-
-
-@pytest.fixture(scope='module')
-def installed(tmp_path_factory):
-    prefix = str(tmp_path_factory.mktemp('install'))
-    built(tmp_path_factory, '-DCMAKE_INSTALL_PREFIX=' + prefix, '-DCATKIN_ENABLE_TESTING=OFF')
     return prefix
 
 
