@@ -33,18 +33,11 @@ def ros_node():
     """Without the master of rostest."""
 
 
-def has_master():
-    try:
-        return rospy.get_master().getPid()[0] == 1
-    except OSError:
-        return False
-
-
 @contextlib.contextmanager
 def master(port):
     process = subprocess.Popen(['rosmaster', '--core', '-p', str(port)])
     try:
-        wait_until(has_master, 'a master')
+        wait_until(rosgraph.is_master_online, 'a master')
         yield process
     finally:
         process.kill()

@@ -4,11 +4,11 @@ import glob
 import os
 import signal
 import socket
-import struct
 import time
 from xmlrpc.client import ServerProxy
 
 import rospy
+from rosgraph.network import write_ros_handshake_header
 
 from ros_3d_bb_lab.evaluation.latency.latency_probe_node import pid_of
 from support.ros import TIMEOUT_S, wait_until
@@ -52,9 +52,8 @@ def never_reading(node, topic, kind):
     with contextlib.closing(socket.socket()) as connection:
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         connection.connect((host, port))
-        fields = ['callerid=/subscriber', 'topic=' + topic, 'md5sum=' + kind._md5sum, 'type=' + kind._type]
-        header = b''.join(struct.pack('<I', len(field)) + field.encode() for field in fields)
-        connection.sendall(struct.pack('<I', len(header)) + header)
+        write_ros_handshake_header(connection, {'callerid': '/subscriber', 'topic': topic, 'md5sum': kind._md5sum,
+                                                'type': kind._type})
         wait_until(lambda: any(entry[1] == '/subscriber' and entry[4] == topic for entry in ServerProxy(uri).getBusInfo(
             '/subscriber')[2]), 'the connection of a subscriber of ' + topic)
         yield

@@ -2,13 +2,14 @@
 import contextlib
 import os
 import shutil
-import socket
 import subprocess
 import sys
 import tempfile
 import time
 from hashlib import sha1
 from unittest import mock
+
+import rosgraph
 
 from ros_3d_bb_lab.evaluation.launching import free_port, running
 from support.code_blocks import ROOT
@@ -128,9 +129,7 @@ class Graph(object):
         self.start([sys.executable, os.path.join(ROOT, 'scripts', 'replay_node'), '_bag:=' + bag, '_rate:=5'])
 
     def _has_master(self):
-        port = int(self.environment['ROS_MASTER_URI'].rsplit(':', 1)[1])
-        with socket.socket() as connection:
-            return connection.connect_ex(('localhost', port)) == 0
+        return rosgraph.is_master_online(self.environment['ROS_MASTER_URI'])
 
     def hears(self, *wanted):
         """Wait for a message on each of these topics ('topic', or 'topic:field that is not empty')."""
