@@ -209,7 +209,7 @@ def text_in_launch_file(node_name, parameter):
     for launch, element in starting(node_name):
         groups = [group for group in launch.tree.iter('group') if group.get('ns') == node_name]
         for given in itertools.chain(*(each.findall('param') for each in [element] + groups)):
-            argument = re.match(r'^\$\(arg (\w+)\)$', given.get('value', ''))
+            argument = re.match(r'^\$\((?:arg|eval .* else) (\w+)\)$', given.get('value', ''))
             if given.get('name') == parameter and argument:
                 text, = (doc for name, _default, doc in launch.arguments if name == argument.group(1))
                 return '%s (`%s:=`)' % (text, argument.group(1))

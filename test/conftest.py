@@ -22,18 +22,13 @@ if importlib.util.find_spec('ros_3d_bb') is None:  # no workspace is sourced; un
 if importlib.util.find_spec('ros_3d_bb_annotator') is None:
     sys.path.insert(0, os.path.join(os.path.dirname(HERE), 'annotator'))
 DATA = os.environ.get('ROS_3D_BB_DATA', '')
-MISSED = set()  # what tests that were left out need
+NEEDS = 'needs %s, not installed'
 
 
 def pytest_addoption(parser):
     parser.addoption('--leave-out', action='store_true',
-                     help='deselect tests that need packages of requirements.txt, or programs, that are not installed')
+                     help='skip tests that need packages of requirements.txt, or programs, that are not installed')
     parser.addoption('--long', action='store_true', help='run the tests with the marker long, and only these')
-
-
-def left_out(config):
-    """Missing modules whose tests are deselected."""
-    return missing_requirements() if config.getoption('--leave-out') else set()
 
 
 def pytest_configure(config):
@@ -44,37 +39,22 @@ def pytest_report_header(config):
     return 'ROS_3D_BB_DATA: %s' % (DATA or 'not set; the tests use generated data')
 
 
-def pytest_terminal_summary(terminalreporter, config):
-    names = left_out(config) | MISSED
-    if names:
-        terminalreporter.write_line('left out: tests that need %s, not installed' % ', '.join(sorted(names)))
-
-
 @pytest.hookimpl(hookwrapper=True)
 def pytest_make_collect_report(collector):
-    """Leave out files that cannot be imported."""
+    """Skip files that cannot be imported."""
     report = (yield).get_result()
     missing = re.search(r"No module named '(\w+)", str(report.longrepr)) if report.failed else None
-    if missing and missing.group(1) in left_out(collector.config):
-        report.outcome, report.longrepr, report.result = 'passed', None, []
+    if missing and collector.config.getoption('--leave-out') and missing.group(1) in missing_requirements():
+        report.outcome, report.longrepr = 'skipped', (str(collector.fspath), 0, NEEDS % missing.group(1))
 
 
 def pytest_collection_modifyitems(config, items):
-    gone = [item for item in items if config.getoption('--leave-out') and missing_for(item)]
-    MISSED.update(*map(missing_for, gone))
-    gone += [item for item in items if bool(item.get_closest_marker('long')) != config.getoption('--long')]
+    gone = [item for item in items if bool(item.get_closest_marker('long')) != config.getoption('--long')]
     config.hook.pytest_deselected(items=gone)
     items[:] = [item for item in items if item not in gone]
-
-
-def pytest_sessionfinish(session):
-    if hasattr(session.config, 'workeroutput'):  # a worker process of pytest-xdist
-        session.config.workeroutput['missed'] = sorted(MISSED)
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_testnodedown(node):
-    MISSED.update(getattr(node, 'workeroutput', {}).get('missed', ()))
+    for item in items if config.getoption('--leave-out') else ():
+        if missing_for(item):
+            item.add_marker(pytest.mark.skip(NEEDS % ', '.join(sorted(missing_for(item)))))
 
 
 @pytest.fixture(scope='session', autouse=True)

@@ -4,7 +4,7 @@ pytest_options=()
 
 run_tests() {
   # Its newest ONNX Runtime and torch lack what some tests need; the report names it.
-  ! is_debian_11 || pytest_options=(--leave-out)
+  ! is_debian_11 || pytest_options=(--leave-out -rs)
   case ${1:-} in
     '') run_all_tests ;;
     -h|--help) help ;;
@@ -34,7 +34,7 @@ run_all_tests() {
   local totals status=0
   totals=$(catkin_test_results --all "$workspace/build/test_results") || status=$?
   echo "$totals"
-  echo "$totals" | awk '/^Summary:/ { printf "%d passed, %d failed\n", $2 - $4 - $6, $4 + $6 }'
+  echo "$totals" | awk '/^Summary:/ { printf "%d passed, %d failed\n", $2 - $4 - $6 - $8, $4 + $6 }'
   return $status
 }
 
@@ -47,7 +47,7 @@ test_on_platform() {  # NAME [--fast | -k EXPR | PATH ...]
     return
   fi
   use_platform "$name"
-  pytest_options=(--leave-out)
+  pytest_options=(--leave-out -rs)
   case ${1:-} in
     ''|--fast) run_tests "$@" ;;
     *) run_some_tests "$@" ;;

@@ -13,8 +13,9 @@ from gazebo_msgs.msg import ModelStates
 from geometry_msgs.msg import PoseStamped
 
 from ros_3d_bb.msg import TrackedObjectArray
-from support.processes import end, processes_naming
-from support.ros import Recorder, wait_until
+from ros_3d_bb_lab.evaluation.launching import running
+from support.processes import processes_naming
+from support.ros import Recorder, launched, wait_until
 
 FPS = 10
 PATIENCE_S = 600.0  # wall-clock time
@@ -54,21 +55,16 @@ class World(object):
 @pytest.fixture(scope='session')
 def start(weights):
     """Function that starts gazebo.launch with arguments, and returns a context with its World."""
-    master = subprocess.Popen(['roscore'])
-    subprocess.check_call('until rosparam set use_sim_time true; do sleep 1; done', shell=True)
-    rospy.init_node('test_gazebo')
-
     @contextlib.contextmanager
     def started(*arguments):
-        nodes = subprocess.Popen(['roslaunch', 'ros_3d_bb', 'gazebo.launch', 'gui:=false', 'rviz:=false',
-                                  'lockstep:=true', 'weights:=' + weights, 'fps:=%d' % FPS] + list(arguments))
-        world = World()
-        try:
+        with launched('gazebo.launch', 'gui:=false', 'rviz:=false', 'lockstep:=true', 'weights:=' + weights,
+                      'fps:=%d' % FPS, *arguments) as nodes:
+            world = World()
             wait_until(lambda: nodes.poll() is not None or world.tracks.messages, 'tracks', PATIENCE_S)
             assert nodes.poll() is None, 'roslaunch has exited'
             yield world
-        finally:
-            end(nodes)
-            wait_until(lambda: not processes_naming('libgazebo_ros_api_plugin'), 'the end of Gazebo', PATIENCE_S)
-    yield started
-    end(master)
+        wait_until(lambda: not processes_naming('libgazebo_ros_api_plugin'), 'the end of Gazebo', PATIENCE_S)
+    with running(['roscore']):
+        subprocess.check_call('until rosparam set use_sim_time true; do sleep 1; done', shell=True)
+        rospy.init_node('test_gazebo')
+        yield started

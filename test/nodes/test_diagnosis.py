@@ -22,8 +22,7 @@ from ros_3d_bb.conversions.camera_msgs import CameraFrame, messages_of
 from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.doctor import graph_findings
-from ros_3d_bb_lab.evaluation.launching import free_port
-from support.processes import end
+from ros_3d_bb_lab.evaluation.launching import free_port, running_roslaunch
 from support.ros import Recorder, header_at, wait_until
 
 COLOR, DEPTH = 'camera/color/image_raw', 'camera/aligned_depth_to_color/image_raw'
@@ -104,11 +103,10 @@ def check_output(tmp_path_factory):
     It repeats the checks for half a minute: on a master of its own, while the other tests run.
     """
     path = tmp_path_factory.mktemp('check') / 'output.txt'
-    with open(str(path), 'w') as stream:
-        process = subprocess.Popen(['roslaunch', '-p', str(free_port()), 'ros_3d_bb', 'pipeline.launch',
-                                    'detector:=none', 'check:=true', 'camera_depth:=/other/depth'], stdout=stream)
-    yield path
-    end(process)
+    with open(str(path), 'w') as stream, running_roslaunch(
+            ['ros_3d_bb', 'pipeline.launch', 'detector:=none', 'check:=true', 'camera_depth:=/other/depth'],
+            free_port(), stream):
+        yield path
 
 
 @pytest.fixture(scope='module')

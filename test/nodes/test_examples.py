@@ -10,21 +10,11 @@ from std_msgs.msg import Header, Int32
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.msg import TrackedObject, TrackedObjectArray
+from ros_3d_bb_lab.evaluation.launching import running
 from support.code_blocks import ROOT
 from support.ros import Recorder, publisher, wait_until
 
 EXAMPLES = os.path.join(ROOT, 'examples')
-
-
-@contextlib.contextmanager
-def running(*command):
-    """Run an example until the end of the block. Yields its process."""
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
-    try:
-        yield process
-    finally:
-        process.terminate()
-        process.communicate(timeout=60)
 
 
 def tracks_at(*positions_m):
@@ -50,7 +40,7 @@ def seen(*positions_m):
 
 
 def test_people_in_an_area_are_counted():
-    with running(os.path.join(EXAMPLES, 'count_people'), '_area:=[0, 0, 4, 2]'):
+    with running([os.path.join(EXAMPLES, 'count_people'), '_area:=[0, 0, 4, 2]']):
         with Recorder('count_people/count', Int32) as counts:
             for positions_m, number in ([(1, 1), (3, 1.9), (3, 2.1), (-1, 1)], 2), ([], 0):
                 with seen(*positions_m):
@@ -59,7 +49,7 @@ def test_people_in_an_area_are_counted():
 
 def test_tracks_become_rows(tmp_path):
     path = tmp_path / 'tracks.csv'
-    with running(os.path.join(EXAMPLES, 'tracks_to_csv'), '_file:=%s' % path), seen((1, 2), (3, 4)):
+    with running([os.path.join(EXAMPLES, 'tracks_to_csv'), '_file:=%s' % path]), seen((1, 2), (3, 4)):
         wait_until(lambda: path.exists() and len(path.read_text().splitlines()) > 2, 'two rows below the header')
     with open(str(path), newline='') as stream:
         rows = [(row['id'], row['label'], float(row['x_m']), float(row['y_m'])) for row in csv.DictReader(stream)]
@@ -71,7 +61,7 @@ def test_the_robot_stops_near_people_and_without_tracks():
     transform.transform.translation.x, transform.transform.rotation.w = 5.0, 1.0
     forward = Twist()
     forward.linear.x = 0.5
-    with running(os.path.join(EXAMPLES, 'stop_near_people'), '_timeout:=5'):
+    with running([os.path.join(EXAMPLES, 'stop_near_people'), '_timeout:=5']):
         tracks, commands = publisher('ros_3d_bb/tracks', TrackedObjectArray), publisher('cmd_vel_in', Twist)
         transforms = rospy.Publisher('/tf_static', TFMessage, queue_size=1, latch=True)
         with Recorder('cmd_vel', Twist) as velocities:
@@ -98,5 +88,5 @@ def test_the_subscriber_in_cpp_compiles_and_prints(tmp_path):
     subprocess.check_call(['cmake', EXAMPLES], cwd=build, stdout=subprocess.DEVNULL)
     subprocess.check_call(['cmake', '--build', '.'], cwd=build, stdout=subprocess.DEVNULL)
     program = os.path.join(build, 'devel', 'lib', 'ros_3d_bb_examples', 'print_tracks')
-    with running(program) as process, seen((1.5, -2)):
+    with running([program], stdout=subprocess.PIPE, universal_newlines=True) as process, seen((1.5, -2)):
         assert 'person 1 at 1.50 -2.00 in map, 0.00 m/s to x' in process.stdout.readline()

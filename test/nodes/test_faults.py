@@ -4,6 +4,7 @@ After each fault, all people must be tracked again within 2 s of images. No trac
 be assigned to a second person, and stamps must be those of images, in order (`Stage.check`).
 """
 import contextlib
+import os
 import time
 
 import pytest
@@ -16,7 +17,8 @@ from visualization_msgs.msg import MarkerArray
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
-from support.processes import hanging, killed_and_back, never_reading, starved
+from ros_3d_bb_lab.evaluation.latency.benchmark import cpu_load
+from support.processes import hanging, killed_and_back, never_reading
 from support.ros import wait_until
 from support.stage import PERIOD_NS, Stage
 
@@ -135,7 +137,7 @@ def test_subscribers_that_never_read_do_not_block_the_others(stage):
 
 
 def test_the_processor_is_busy(stage):
-    with starved(4):
+    with cpu_load(4 * os.cpu_count()):
         send_images(stage, 30, PERIOD_NS / NS)
     stage.scene = 1
     stage.recovered('4 busy processes for each core, 3 s')

@@ -15,7 +15,7 @@ from std_msgs.msg import UInt32
 from std_srvs.srv import SetBool
 
 from ros_3d_bb.msg import TrackedObjectArray
-from support.processes import pid_of
+from ros_3d_bb_lab.evaluation.latency.latency_probe_node import pid_of
 from support.ros import Recorder, launched, wait_until
 
 FOLLOWED_S = float(os.environ.get('ROS_3D_BB_FOLLOW_S', 25))

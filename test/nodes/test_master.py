@@ -20,7 +20,8 @@ from ros_3d_bb.nodes.common.master import Registration, on_new_master
 from ros_3d_bb.nodes.viewer_node import Label
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb_lab.evaluation.launching import free_port
-from support.processes import killed_and_back, pid_of
+from ros_3d_bb_lab.evaluation.latency.latency_probe_node import pid_of
+from support.processes import killed_and_back
 from support.ros import TIMEOUT_S, Recorder, launched, wait_until
 from support.stage import RECOVERY_IMAGES, Stage
 
@@ -32,18 +33,11 @@ def ros_node():
     """Without the master of rostest."""
 
 
-def has_master():
-    try:
-        return rospy.get_master().getPid()[0] == 1
-    except OSError:
-        return False
-
-
 @contextlib.contextmanager
 def master(port):
     process = subprocess.Popen(['rosmaster', '--core', '-p', str(port)])
     try:
-        wait_until(has_master, 'a master')
+        wait_until(rosgraph.is_master_online, 'a master')
         yield process
     finally:
         process.kill()

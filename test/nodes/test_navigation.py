@@ -2,7 +2,6 @@
 import itertools
 import os
 import signal
-import subprocess
 import time
 
 import numpy as np
@@ -19,10 +18,11 @@ from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
+from ros_3d_bb_lab.evaluation.launching import running
+from ros_3d_bb_lab.evaluation.latency.latency_probe_node import pid_of
 from ros_3d_bb_lab.simulation.driven_world import moved
 from ros_3d_bb_lab.simulation.simulator import upright
 from support.planner_definitions import message_class
-from support.processes import end, pid_of
 from support.real_planners import ROOT, planner_environment
 from support.ros import Recorder, header_at, wait_until
 from support.two_cameras import boxes
@@ -159,21 +159,17 @@ def two_people(seconds):
 @pytest.fixture(scope='module')
 def robot(request):
     """The robot without people around it; the nodes run. The parameter is the local planner, by default dwa."""
-    environment = planner_environment()
-    nodes = subprocess.Popen(['roslaunch', os.path.join(ROOT, 'test', 'support', 'navigation.launch'),
-                              'local_planner:=' + getattr(request, 'param', 'dwa')], env=environment)
-    driven = DrivenRobot()
-    driven.social = Recorder('social_costmap/costmap/costmap', OccupancyGrid, publisher_expected=False)
-    driven.goal = rospy.Publisher('move_base_simple/goal', PoseStamped, queue_size=1)
-    try:
-        def are_ready():
-            driven.advance(0.1, is_driven=False)
-            return (driven.costmap.messages and driven.social.messages and driven.tracks.messages
-                    and driven.goal.get_num_connections())
+    def are_ready():
+        driven.advance(0.1, is_driven=False)
+        return (driven.costmap.messages and driven.social.messages and driven.tracks.messages
+                and driven.goal.get_num_connections())
+    with running(['roslaunch', os.path.join(ROOT, 'test', 'support', 'navigation.launch'),
+                  'local_planner:=' + getattr(request, 'param', 'dwa')], env=planner_environment()):
+        driven = DrivenRobot()
+        driven.social = Recorder('social_costmap/costmap/costmap', OccupancyGrid, publisher_expected=False)
+        driven.goal = rospy.Publisher('move_base_simple/goal', PoseStamped, queue_size=1)
         wait_until(are_ready, 'all nodes', 120.0)
         yield driven
-    finally:
-        end(nodes)
 
 
 @pytest.fixture

@@ -4,7 +4,6 @@ They need a master because of ROS time, tf2 and deadlines. Stamps are those of t
 second old. Their outputs are tested without a master in test/workspace, the speeds in test/unit/test_safe_speed.py.
 """
 import signal
-import subprocess
 import time
 
 import numpy as np
@@ -20,6 +19,7 @@ from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
+from ros_3d_bb_lab.evaluation.launching import running
 from support.ros import Recorder, header_at, person, publisher, wait_until
 
 LATENCY_NS, TIMEOUT_S = NS // 10, 0.5
@@ -113,14 +113,10 @@ def test_people_are_removed_from_the_scan(rig):
 
 
 def test_a_bridge_that_ends_empties_its_outputs(rig):
-    process = subprocess.Popen(['rosrun', 'ros_3d_bb', 'planner_bridge_node', '__name:=second_bridge'])
-    try:
-        with Recorder('second_bridge/points', PointCloud2) as recorder:
-            wait_until(lambda: rig.tracks.get_num_connections() == 4, 'the second bridge')
-            rig.send((1.0, 2.0))
-            wait_until(lambda: recorder.messages and recorder.messages[-1].width, 'points')
-            process.send_signal(signal.SIGINT)
-            wait_until(lambda: not recorder.messages[-1].width, 'an empty cloud')
-    finally:
-        process.kill()
-        process.wait()
+    with running(['rosrun', 'ros_3d_bb', 'planner_bridge_node', '__name:=second_bridge']) as process, \
+            Recorder('second_bridge/points', PointCloud2) as recorder:
+        wait_until(lambda: rig.tracks.get_num_connections() == 4, 'the second bridge')
+        rig.send((1.0, 2.0))
+        wait_until(lambda: recorder.messages and recorder.messages[-1].width, 'points')
+        process.send_signal(signal.SIGINT)
+        wait_until(lambda: not recorder.messages[-1].width, 'an empty cloud')

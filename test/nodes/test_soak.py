@@ -10,8 +10,7 @@ import rospy
 
 import test_faults as faults
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
-from ros_3d_bb_lab.evaluation.latency.latency_probe_node import usage_of
-from support.processes import pid_of
+from ros_3d_bb_lab.evaluation.latency.latency_probe_node import pid_of, usage_of
 from test_faults import pipeline_stage, stage  # noqa: F401 (fixtures)
 
 FAULTS = ([(faults.test_a_node_hangs_and_continues, node) for node in faults.NODES]

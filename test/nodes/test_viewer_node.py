@@ -16,6 +16,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
+from ros_3d_bb_lab.evaluation.launching import running
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
@@ -139,14 +140,12 @@ def window(rig, monkeypatch, tmp_path):
     """Start the node with a window; returns its process and session."""
     monkeypatch.setenv('DISPLAY', '')  # restored afterwards
     screen, folder = start_screen(), str(tmp_path / 'session')
-    process = subprocess.Popen(['rosrun', 'ros_3d_bb', 'viewer_node', '__name:=window', '_session:=' + folder,
-                                '_label:=by hand'])
-    wait_until(lambda: all(pub.get_num_connections() >= 2 for pub in rig.pubs.values()), 'the connections')
-    rospy.wait_for_service('window/capture', timeout=20)
-    yield process, folder
-    for started in (process, screen):
-        started.kill()
-        started.wait()
+    with running(['rosrun', 'ros_3d_bb', 'viewer_node', '__name:=window', '_session:=' + folder,
+                  '_label:=by hand']) as process:
+        wait_until(lambda: all(pub.get_num_connections() >= 2 for pub in rig.pubs.values()), 'the connections')
+        rospy.wait_for_service('window/capture', timeout=20)
+        yield process, folder
+    screen.kill()
 
 
 def test_keys_store_pause_and_quit(rig, window):

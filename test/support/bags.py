@@ -1,5 +1,9 @@
-"""Content of bags, and bags with changed messages."""
+"""Content of bags, bags of simulated scenes, and bags with changed messages."""
 import rosbag
+
+from ros_3d_bb.bags.bag_writer import write_bag
+from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
+from ros_3d_bb_lab.simulation.scenario import scenario_from
 
 
 def messages_in(path, *topics):
@@ -9,6 +13,12 @@ def messages_in(path, *topics):
         for topic, message, _time in bag.read_messages(topics or None):
             by_topic.setdefault(topic, []).append(message)
     return by_topic
+
+
+def scene_bag(path, scene, with_boxes=False):
+    """Write a bag of a scene, the content of a scenario file. Returns its path."""
+    write_bag(scenario_images(scenario_from(scene), with_boxes), str(path))
+    return str(path)
 
 
 def changed_bag(source, target, change):

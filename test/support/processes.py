@@ -4,14 +4,13 @@ import glob
 import os
 import signal
 import socket
-import struct
-import subprocess
-import sys
 import time
-from xmlrpc.client import Fault, ServerProxy
+from xmlrpc.client import ServerProxy
 
 import rospy
+from rosgraph.network import write_ros_handshake_header
 
+from ros_3d_bb_lab.evaluation.latency.latency_probe_node import pid_of
 from support.ros import TIMEOUT_S, wait_until
 
 
@@ -22,15 +21,6 @@ def processes_naming(text):
         with contextlib.suppress(OSError), open(path) as stream:  # a process may have ended
             found += text in stream.read()
     return found
-
-
-def pid_of(node):
-    """The process of a node; None if it does not respond."""
-    code, _status, uri = rospy.get_master().lookupNode(node)
-    try:
-        return ServerProxy(uri).getPid(rospy.get_name())[2] if code == 1 else None
-    except (OSError, Fault):
-        return None
 
 
 def killed_and_back(node, meanwhile):
@@ -55,19 +45,6 @@ def hanging(node):
 
 
 @contextlib.contextmanager
-def starved(at_once):
-    """This many processes for each core run endless loops."""
-    busy = [subprocess.Popen([sys.executable, '-c', 'while True: pass']) for _ in range(at_once * os.cpu_count())]
-    try:
-        yield
-    finally:
-        for process in busy:
-            process.kill()
-        for process in busy:
-            process.wait()
-
-
-@contextlib.contextmanager
 def never_reading(node, topic, kind):
     """A node has a subscriber that never reads from its connection."""
     uri = rospy.get_master().lookupNode(node)[2]
@@ -75,19 +52,8 @@ def never_reading(node, topic, kind):
     with contextlib.closing(socket.socket()) as connection:
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         connection.connect((host, port))
-        fields = ['callerid=/subscriber', 'topic=' + topic, 'md5sum=' + kind._md5sum, 'type=' + kind._type]
-        header = b''.join(struct.pack('<I', len(field)) + field.encode() for field in fields)
-        connection.sendall(struct.pack('<I', len(header)) + header)
+        write_ros_handshake_header(connection, {'callerid': '/subscriber', 'topic': topic, 'md5sum': kind._md5sum,
+                                                'type': kind._type})
         wait_until(lambda: any(entry[1] == '/subscriber' and entry[4] == topic for entry in ServerProxy(uri).getBusInfo(
             '/subscriber')[2]), 'the connection of a subscriber of ' + topic)
         yield
-
-
-def end(roslaunch):
-    """Terminate roslaunch with its nodes."""
-    roslaunch.send_signal(signal.SIGINT)
-    try:
-        roslaunch.wait(30)
-    except subprocess.TimeoutExpired:
-        roslaunch.kill()
-        roslaunch.wait()

@@ -2,8 +2,6 @@
 import contextlib
 import os
 import shutil
-import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -11,7 +9,9 @@ import time
 from hashlib import sha1
 from unittest import mock
 
-from ros_3d_bb_lab.evaluation.launching import free_port
+import rosgraph
+
+from ros_3d_bb_lab.evaluation.launching import free_port, running
 from support.code_blocks import ROOT
 from support.launching import RS_CAMERA_ARGUMENTS, stand_in_gazebo, stand_in_launch_file, write
 from support.screen import start_screen
@@ -90,12 +90,11 @@ class Reader(object):
     @contextlib.contextmanager
     def running(self, block, at=None, replaced=(), **environment):
         """Run a block until Ctrl-C. Yields a Graph, and ends it."""
-        graph = Graph(self.environment(**dict({'ROS_MASTER_URI': 'http://localhost:%d' % free_port()}, **environment)))
-        try:
+        environment = dict({'ROS_MASTER_URI': 'http://localhost:%d' % free_port()}, **environment)
+        with contextlib.ExitStack() as processes:
+            graph = Graph(self.environment(**environment), processes)
             graph.start(['bash', '-c', self.typed(block, replaced)], cwd=str(at or self.home))
             yield graph
-        finally:
-            graph.end()
 
     def screen(self):
         """DISPLAY of a virtual screen, which ends with the tests."""
@@ -107,26 +106,22 @@ class Reader(object):
 
 
 class Graph(object):
-    """Processes on one ROS master."""
+    """Processes on one ROS master, which an ExitStack ends, and their output."""
 
-    def __init__(self, environment):
-        self.environment, self._started = environment, []
+    def __init__(self, environment, processes):
+        self.environment, self._processes, self._first = environment, processes, None
+        self._output = processes.enter_context(tempfile.NamedTemporaryFile())
 
     def start(self, command, **options):
-        """Start a process with its own output file."""
-        descriptor, path = tempfile.mkstemp('.txt', 'output', self.environment['HOME'])
-        with os.fdopen(descriptor, 'w') as stream:
-            process = subprocess.Popen(command, env=self.environment, stdin=subprocess.DEVNULL, stdout=stream,
-                                       stderr=subprocess.STDOUT, start_new_session=True, **options)
-        self._started.append((process, path))
-        return process
+        """Start a process."""
+        process = self._processes.enter_context(running(
+            command, env=self.environment, stdin=subprocess.DEVNULL, stdout=self._output, stderr=subprocess.STDOUT,
+            **options))
+        self._first = self._first or process
 
     def output(self):
-        texts = []
-        for _process, path in self._started:
-            with open(path, errors='replace') as stream:
-                texts.append(stream.read())
-        return '\n'.join(texts)
+        with open(self._output.name, errors='replace') as stream:
+            return stream.read()
 
     def starts_camera(self, bag):
         """Play a bag at 5 Hz, as the camera of a robot."""
@@ -134,9 +129,7 @@ class Graph(object):
         self.start([sys.executable, os.path.join(ROOT, 'scripts', 'replay_node'), '_bag:=' + bag, '_rate:=5'])
 
     def _has_master(self):
-        port = int(self.environment['ROS_MASTER_URI'].rsplit(':', 1)[1])
-        with socket.socket() as connection:
-            return connection.connect_ex(('localhost', port)) == 0
+        return rosgraph.is_master_online(self.environment['ROS_MASTER_URI'])
 
     def hears(self, *wanted):
         """Wait for a message on each of these topics ('topic', or 'topic:field that is not empty')."""
@@ -155,18 +148,6 @@ class Graph(object):
         """Wait for a condition; fail after PATIENCE_S, or when the first process ends."""
         deadline_s = time.monotonic() + PATIENCE_S
         while not condition():
-            assert time.monotonic() < deadline_s and self._started[0][0].poll() is None, (
+            assert time.monotonic() < deadline_s and self._first.poll() is None, (
                 'timeout: %s\n%s' % (what, self.output()))
             time.sleep(0.1)
-
-    def end(self):
-        """Send Ctrl-C to all processes, the last first, and wait for them."""
-        for process, _path in reversed(self._started):
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGINT)
-        for process, _path in self._started:
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                process.wait(40)  # roslaunch itself gives nodes 15 s, and kills them then
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
-            process.wait()

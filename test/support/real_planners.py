@@ -1,10 +1,8 @@
 """The environment of the real planners, which are built from archives in ROS_3D_BB_DATA."""
 import os
 import subprocess
-import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-ENVIRONMENT = 'import os, sys; sys.stdout.write("\\0".join("%s=%s" % item for item in os.environ.items()))'
 
 
 def planner_environment():
@@ -16,6 +14,5 @@ def planner_environment():
     printed = subprocess.check_output([os.path.join(ROOT, 'run'), 'planners'], env=environment).decode().split()
     assert printed, 'ROS_3D_BB_DATA contains no archives of the planners'
     setup = printed[-1]
-    text = subprocess.check_output(['bash', '-c', 'source %s --extend && exec %s -c \'%s\''
-                                    % (setup, sys.executable, ENVIRONMENT)]).decode()
-    return dict(pair.split('=', 1) for pair in text.split('\0'))
+    text = subprocess.check_output(['bash', '-c', 'source %s --extend && env -0' % setup]).decode()
+    return dict(pair.split('=', 1) for pair in text.rstrip('\0').split('\0'))

@@ -1,6 +1,4 @@
 """Shared by the tests of nodes: recording topics, and messages of a camera and of a track."""
-import contextlib
-import signal
 import subprocess
 import time
 
@@ -12,6 +10,7 @@ from std_msgs.msg import Header
 
 from ros_3d_bb.conversions.image_msgs import fill_image
 from ros_3d_bb.conversions.perception_msgs import time_from, tracks_to_msg
+from ros_3d_bb_lab.evaluation.launching import running
 from support.tracks import track_at
 
 TIMEOUT_S = 20.0
@@ -25,16 +24,9 @@ def wait_until(condition, what, timeout_s=TIMEOUT_S):
         time.sleep(0.01)
 
 
-@contextlib.contextmanager
 def launched(*arguments):
     """Run a launch file of the package on this test's master, until the end of the block."""
-    process = subprocess.Popen(['roslaunch', 'ros_3d_bb'] + list(arguments))
-    try:
-        yield process
-    finally:
-        if process.poll() is None:
-            process.send_signal(signal.SIGINT)
-        process.wait()
+    return running(['roslaunch', 'ros_3d_bb'] + list(arguments))
 
 
 def started(node, *params):

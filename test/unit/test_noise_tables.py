@@ -6,8 +6,7 @@ from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.sessions.plausibility import FACTORS, likely_errors
 from ros_3d_bb.sessions.session_writer import append
 from ros_3d_bb.sessions.snapshots import ColorImage, Snapshot
-from ros_3d_bb_lab.evaluation.noise.analysis import Inputs, analyse
-from ros_3d_bb_lab.evaluation.noise.statistics import cluster_statistics
+from ros_3d_bb_lab.evaluation.noise.analysis import Inputs, analyse, cluster_statistics
 from ros_3d_bb_lab.evaluation.noise.tables import Cluster, MeasurementTable, read_session_measurements, read_table
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator

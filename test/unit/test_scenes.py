@@ -11,8 +11,8 @@ from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb_lab.evaluation.clear_mot import score
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_paths, scene_name
 from ros_3d_bb_lab.evaluation.scene_benchmark import (RANGE_M, depth_detector, detections_without_scores,
-                                                      exact_detector, result_of, yolov5_detector)
-from ros_3d_bb_lab.evaluation.scenes import run_scene, score_detections
+                                                      exact_detector, result_of, run_scene, score_detections,
+                                                      yolov5_detector)
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import Simulator
 

@@ -6,10 +6,8 @@ import sys
 
 import pytest
 
-from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb_lab.evaluation.navigation.benchmark import MODES
-from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
-from ros_3d_bb_lab.simulation.scenario import scenario_from
+from support.bags import scene_bag
 from support.launching import loaded
 from support.processes import processes_naming
 from support.real_planners import planner_environment
@@ -70,9 +68,8 @@ NODES = {'replay_node', 'latency_probe_node', 'bbox3d_node', 'tracker_node'}
 def test_results_are_written_and_no_process_remains(tmp_path):
     """On half a second of two standing people, with their 2D boxes. Processes of nodes name the folder of the log."""
     people = [{'start': [3.0, 0.6], 'facing': 3.1}, {'start': [4.0, -0.7], 'facing': 3.1}]
-    scenario = scenario_from({'duration': 0.4, 'rate': 20.0, 'robot': {}, 'people': people})
-    bag, results = str(tmp_path / 'images.bag'), str(tmp_path / 'latency.json')
-    write_bag(scenario_images(scenario, with_boxes=True), bag, 'none')
+    scene, results = {'duration': 0.4, 'rate': 20.0, 'people': people}, str(tmp_path / 'latency.json')
+    bag = scene_bag(tmp_path / 'images.bag', scene, with_boxes=True)
     printed = subprocess.check_output(
         [sys.executable, '-m', 'ros_3d_bb_lab.evaluation', 'latency', '--bag', bag, '--cases', 'free', '--seconds', '5',
          '--rate', '10', '--separate', '--limits', '--json', results], universal_newlines=True,

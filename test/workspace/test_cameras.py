@@ -3,15 +3,12 @@ import rosbag
 
 from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.bag_reader import BagError
-from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.bags.process_bag import with_params
 from ros_3d_bb.conversions.perception_msgs import stamp_of
 from ros_3d_bb.pipeline.people_pipeline import Settings
 from ros_3d_bb_lab.evaluation.clear_mot import score
 from ros_3d_bb_lab.evaluation.demo.scene_report import panels_of, read_recording
-from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
-from ros_3d_bb_lab.simulation.scenario import scenario_from
-from support.bags import messages_in
+from support.bags import messages_in, scene_bag
 from support.launching import loaded
 from support.two_cameras import Rig
 
@@ -25,9 +22,9 @@ BOTH = with_params(Settings(detector='none'), 'tracker', cameras=['front', 'left
 def bags(tmp_path_factory):
     """A bag of the scene with its 2D boxes, and the output of process_bag."""
     folder = tmp_path_factory.mktemp('bags')
-    write_bag(scenario_images(scenario_from(SCENE), with_boxes=True), str(folder / 'in.bag'))
-    process_bag(str(folder / 'in.bag'), str(folder / 'out.bag'), BOTH)
-    return str(folder / 'in.bag'), str(folder / 'out.bag')
+    path = scene_bag(folder / 'in.bag', SCENE, with_boxes=True)
+    process_bag(path, str(folder / 'out.bag'), BOTH)
+    return path, str(folder / 'out.bag')
 
 
 def test_each_person_is_one_track_in_both_views(bags):

@@ -11,7 +11,6 @@ import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from sensor_msgs.msg import CameraInfo, Image
 
-from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth
@@ -20,9 +19,7 @@ from ros_3d_bb.diagnosis.checks import ROLES
 from ros_3d_bb.diagnosis.message_observer import Observation
 from ros_3d_bb.nodes.common.graph_observer import GraphObserver
 from ros_3d_bb.nodes.doctor import bag_findings, machine_findings
-from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
-from ros_3d_bb_lab.simulation.scenario import scenario_from
-from support.bags import changed_bag
+from support.bags import changed_bag, scene_bag
 from support.masterless import masterless
 from support.ros import header_at
 
@@ -33,9 +30,7 @@ DEPTH_INFO = '/camera/aligned_depth_to_color/camera_info'
 
 @pytest.fixture(scope='module')
 def bag(tmp_path_factory):
-    path = str(tmp_path_factory.mktemp('bags') / 'scene.bag')
-    write_bag(scenario_images(scenario_from(SCENE), with_boxes=True), path)
-    return path
+    return scene_bag(tmp_path_factory.mktemp('bags') / 'scene.bag', SCENE, with_boxes=True)
 
 
 def changed(bag, folder, change):

@@ -1,22 +1,17 @@
 """Ten minutes of following a person past people who cross, in the simulator: the same result on any machine."""
-import functools
 import os
 from collections import namedtuple
 
 import numpy as np
 import pytest
 
-from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.planning.following import FollowParams, Follower
 from ros_3d_bb.planning.safe_speed import SafeSpeedParams
-from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.types import CameraView
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL
-from ros_3d_bb_lab.evaluation.scene_benchmark import depth_detector
-from ros_3d_bb_lab.evaluation.scenes import detections_in
+from ros_3d_bb_lab.evaluation.scene_benchmark import depth_detector, track_frame
 from ros_3d_bb_lab.simulation.driven_world import DrivenWorld
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import Simulator
@@ -56,7 +51,9 @@ class FollowedScene(object):
             poses = self._simulator.poses(state)
             robot_from_map = np.linalg.inv(poses.map_from_odom.dot(poses.odom_from_base))
             if number is not None:
-                self._waiting.append((time_s, self._tracks(number, state, time_s)))
+                frame = self._simulator.frame(number, state)
+                self._waiting.append((time_s, track_frame(self._tracker, frame, self._detect(frame), int(time_s * NS),
+                                                          self._simulator.camera, self._error_model)))
             while self._waiting and self._waiting[0][0] + LATENCY_S <= time_s:
                 self._newest = self._waiting.pop(0)
                 self._follow(state, robot_from_map)
@@ -64,14 +61,6 @@ class FollowedScene(object):
                 stamp_s, tracks = self._newest
                 self._world.command(*self._follower.command(tracks, time_s - stamp_s, robot_from_map, PERIOD_S))
         return self
-
-    def _tracks(self, number, state, time_s):
-        frame = self._simulator.frame(number, state)
-        depth, pose = DepthImage(frame.depth_mm, 0.001), frame.poses.map_from_camera
-        detections = detections_in(depth, self._detect(frame), self._simulator.camera, pose, self._error_model)
-        depth_at = functools.partial(depths_towards, self._simulator.camera, depth)
-        view = CameraView(pose, self._simulator.camera, '', depth_at)
-        return self._tracker.update(int(time_s * NS), detections, view)
 
     def _follow(self, state, robot_from_map):
         stamp_s, tracks = self._newest

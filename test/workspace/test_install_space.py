@@ -7,34 +7,28 @@ import sys
 
 import pytest
 
-from ros_3d_bb_lab.evaluation.launching import free_port
+from ros_3d_bb_lab.evaluation.launching import free_port, running
 from support.small_session import write_small_session
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 PROGRAMS = sorted(os.path.basename(path) for path in glob.glob(os.path.join(ROOT, 'scripts', '*'))) + ['annotator']
 NODES = [name for name in PROGRAMS if name.endswith('_node')]
-FOLDERS = ('launch', 'config', 'examples', 'rviz', 'msg', 'urdf', 'worlds')
-
-
-def built(tmp_path_factory, *options, **environment):
-    """Build and install a copy of the sources with cmake. Returns the deleted source and build folders."""
-    source, build = str(tmp_path_factory.mktemp('source') / 'ros_3d_bb'), str(tmp_path_factory.mktemp('build'))
-    shutil.copytree(ROOT, source, ignore=shutil.ignore_patterns('.git', '__pycache__'))
-    layout = 'ON' if sys.base_prefix == '/usr' else 'OFF'  # of Debian's own Python
-    for command in (['cmake', source, '-DPYTHON_EXECUTABLE=' + sys.executable, '-DSETUPTOOLS_DEB_LAYOUT=' + layout]
-                    + list(options), ['make', '-j2', 'install']):
-        result = subprocess.run(command, cwd=build, env=dict(os.environ, **environment), stdout=subprocess.PIPE,
-                                stderr=subprocess.STDOUT)
-        assert result.returncode == 0, result.stdout.decode()
-    shutil.rmtree(source)
-    shutil.rmtree(build)
-    return source, build
+FOLDERS = ('launch', 'config', 'examples', 'rviz', 'msg', 'urdf')
 
 
 @pytest.fixture(scope='module')
 def installed(tmp_path_factory):
-    prefix = str(tmp_path_factory.mktemp('install'))
-    built(tmp_path_factory, '-DCMAKE_INSTALL_PREFIX=' + prefix, '-DCATKIN_ENABLE_TESTING=OFF')
+    prefix, source, build = (str(tmp_path_factory.mktemp(name) / 'ros_3d_bb') for name in ('prefix', 'source', 'build'))
+    shutil.copytree(ROOT, source, ignore=shutil.ignore_patterns('.git', '__pycache__'))
+    os.mkdir(build)
+    layout = 'ON' if sys.base_prefix == '/usr' else 'OFF'  # of Debian's own Python
+    for command in (['cmake', source, '-DCMAKE_INSTALL_PREFIX=' + prefix, '-DCATKIN_ENABLE_TESTING=OFF',
+                     '-DPYTHON_EXECUTABLE=' + sys.executable, '-DSETUPTOOLS_DEB_LAYOUT=' + layout],
+                    ['make', '-j2', 'install']):
+        result = subprocess.run(command, cwd=build, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        assert result.returncode == 0, result.stdout.decode()
+    shutil.rmtree(source)
+    shutil.rmtree(build)
     return prefix
 
 
@@ -63,16 +57,14 @@ def test_launch_config_rviz_and_scripts_are_installed(installed):
         assert files_in(os.path.join(share, folder)) == files_in(os.path.join(ROOT, folder))
     assert sorted(os.listdir(os.path.join(installed, 'lib', 'ros_3d_bb'))) == sorted(PROGRAMS)
     assert os.path.exists(os.path.join(share, 'LICENSE'))
+    assert os.path.exists(os.path.join(share, 'worlds', 'people.world'))
 
 
 @pytest.fixture(scope='module')
 def master():
     port = str(free_port())
-    process = subprocess.Popen(['rosmaster', '--core', '-p', port], stdout=subprocess.DEVNULL,
-                               stderr=subprocess.DEVNULL)
-    yield 'http://localhost:' + port
-    process.terminate()
-    process.wait()
+    with running(['rosmaster', '--core', '-p', port], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL):
+        yield 'http://localhost:' + port
 
 
 @pytest.mark.parametrize('name', NODES)

@@ -6,7 +6,6 @@ from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import Header
 
 from ros_3d_bb.bags.bag_pipeline import process_bag
-from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.images import DepthImage, mounted_camera
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, TF_TOPIC, CameraFrame, messages_of
@@ -19,9 +18,7 @@ from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
 from ros_3d_bb.nodes.people_node import PeopleNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.pipeline.people_pipeline import Settings
-from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
-from ros_3d_bb_lab.simulation.scenario import scenario_from
-from support.bags import messages_in
+from support.bags import messages_in, scene_bag
 from support.compressed import compressed_fields, rewritten
 from support.masterless import masterless, published
 from support.ros import wait_until
@@ -35,8 +32,7 @@ CODECS = {'plain': {}, 'compressed': {COLOR_TOPIC: 'jpeg', DEPTH_TOPIC: 'compres
 @pytest.fixture(scope='module', params=sorted(CODECS))
 def bags(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp('bags')
-    write_bag(scenario_images(scenario_from(SCENE)), str(folder / 'plain.bag'))
-    names = rewritten(folder / 'plain.bag', folder / 'in.bag', {
+    names = rewritten(scene_bag(folder / 'plain.bag', SCENE), folder / 'in.bag', {
         topic: lambda message, codec=codec: CompressedImage(**compressed_fields(message, codec))
         for topic, codec in CODECS[request.param].items()})
     process_bag(str(folder / 'in.bag'), str(folder / 'out.bag'), Settings(detector='depth', names=names))

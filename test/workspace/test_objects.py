@@ -1,34 +1,28 @@
 import pytest
 
-from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
+from ros_3d_bb.bags.bag_pipeline import process_bag
+from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.bags.process_bag import with_params
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, TRACKS_TOPIC, tracks_from_msg, usable_boxes3d
-from ros_3d_bb.core.event_counter import EventCounter
-from ros_3d_bb.pipeline.people_pipeline import PeoplePipeline, Settings
+from ros_3d_bb.pipeline.people_pipeline import Settings
 from ros_3d_bb_lab.evaluation.clear_mot import Moment, score
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_path
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import TRUTH_TOPIC, scenario_images
 from ros_3d_bb_lab.simulation.scenario import read_scenario
+from support.bags import messages_in
 
 LABELS = ['chair', 'dog', 'person', 'trolley']
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope='module')
-def run():
-    """[(truth, 3D boxes, tracks)] of the images of config/scenarios/objects.yaml, as process_bag makes them."""
-    settings = with_params(Settings(detector='none'), 'bbox3d', error_model=SIMULATED_ERROR_MODEL)
-    transforms, images = BagTransforms(), []
-    pipeline = PeoplePipeline(settings, EventCounter(), transforms)
-    for stamp_ns, messages in scenario_images(read_scenario(scenario_path('objects')), with_boxes=True):
-        of_topic = dict(messages)
-        transforms.add(of_topic['tf'])
-        for topic, message in messages:
-            if topic in settings.inputs and topic != 'tf':
-                pipeline.take(topic, message, stamp_ns)
-        results = dict(pipeline.take_results())
-        images.append((of_topic[TRUTH_TOPIC], results[BOXES3D_TOPIC], results[TRACKS_TOPIC]))
-    return images
+def run(tmp_path_factory):
+    """[(truth, 3D boxes, tracks)] of the images of config/scenarios/objects.yaml."""
+    source, target = (str(tmp_path_factory.mktemp('bags') / name) for name in ('in.bag', 'out.bag'))
+    write_bag(scenario_images(read_scenario(scenario_path('objects')), with_boxes=True), source)
+    process_bag(source, target, with_params(Settings(detector='none'), 'bbox3d', error_model=SIMULATED_ERROR_MODEL))
+    found = messages_in(target)
+    return list(zip(*(found['/' + topic] for topic in (TRUTH_TOPIC, BOXES3D_TOPIC, TRACKS_TOPIC))))
 
 
 def test_each_object_is_one_track_with_its_label(run):

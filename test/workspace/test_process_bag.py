@@ -20,9 +20,7 @@ from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, time_from, t
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.pipeline.people_pipeline import Settings
 from ros_3d_bb.sessions.session_reader import read_session
-from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
-from ros_3d_bb_lab.simulation.scenario import scenario_from
-from support.bags import changed_bag, messages_in
+from support.bags import changed_bag, messages_in, scene_bag
 
 SCENE = {'duration': 1.5, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]},
                                                    {'start': [4.0, -0.8]}]}
@@ -31,9 +29,7 @@ DEPTH = Settings(detector='depth')
 
 @pytest.fixture(scope='module')
 def scene(tmp_path_factory):
-    path = str(tmp_path_factory.mktemp('scene') / 'scene.bag')
-    write_bag(scenario_images(scenario_from(SCENE)), path)
-    return path
+    return scene_bag(tmp_path_factory.mktemp('scene') / 'scene.bag', SCENE)
 
 
 @pytest.fixture
@@ -131,8 +127,8 @@ def test_images_far_apart_need_the_tolerance_named_by_the_message(tmp_path):
         if 'depth' in topic:
             message.header.stamp -= genpy.Duration(0, 112 * NS // 1000)
         return topic, message, time
-    write_bag(scenario_images(scenario_from(dict(SCENE, duration=0.1)), with_boxes=True), str(tmp_path / 'scene.bag'))
-    path, settings = changed_bag(tmp_path / 'scene.bag', tmp_path / 'in.bag', older), Settings(detector='none')
+    scene = scene_bag(tmp_path / 'scene.bag', dict(SCENE, duration=0.1), with_boxes=True)
+    path, settings = changed_bag(scene, tmp_path / 'in.bag', older), Settings(detector='none')
     sentence = process_bag(path, str(tmp_path / 'out.bag'), settings).sentences['2D boxes rejected']
     tolerance_s = float(re.search(r'~stamp_tolerance: ([0-9.]+)', sentence).group(1))
     process_bag(path, str(tmp_path / 'out.bag'), with_params(settings, 'bbox3d', stamp_tolerance=tolerance_s))

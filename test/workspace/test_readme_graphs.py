@@ -6,9 +6,7 @@ import sys
 import pytest
 import yaml
 
-from ros_3d_bb.bags.bag_writer import write_bag
-from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
-from ros_3d_bb_lab.simulation.scenario import scenario_from
+from support.bags import scene_bag
 from support.code_blocks import claimed
 
 TRACKS, BOXES = 'ros_3d_bb/tracks:objects', 'ros_3d_bb/bb_3d:boxes'
@@ -55,9 +53,9 @@ def test_launch_files_load_with_the_arguments_of_a_command(reader, beginning):
 
 def test_a_camera_on_a_desk(reader, tmp_path):
     """From the first package to tracks in RViz, with a driver that publishes no frames above camera_link."""
-    write_bag(scenario_images(scenario_from(dict(SCENE, duration=3.0))), str(tmp_path / 'scene.bag'))
+    path = scene_bag(tmp_path / 'scene.bag', dict(SCENE, duration=3.0))
     (reader.etc / 'setup.bash').touch()
-    with reader.running(ON_NOETIC, DISPLAY=reader.screen(), READER_BAG=str(tmp_path / 'scene.bag')) as graph:
+    with reader.running(ON_NOETIC, DISPLAY=reader.screen(), READER_BAG=path) as graph:
         graph.hears('camera/color/camera_info')
         graph.start(['bash', '-c', reader.typed(DESK)], cwd=str(reader.home))
         graph.shows('RViz')
@@ -65,10 +63,10 @@ def test_a_camera_on_a_desk(reader, tmp_path):
 
 
 def test_another_detector(reader, tmp_path):
-    write_bag(scenario_images(scenario_from(SCENE)), str(tmp_path / 'scene.bag'))
+    path = scene_bag(tmp_path / 'scene.bag', SCENE)
     (tmp_path / 'detector.py').write_text(OWN_DETECTOR.text)
     with reader.running(BESIDE_DETECTOR) as graph:
-        graph.starts_camera(str(tmp_path / 'scene.bag'))
+        graph.starts_camera(path)
         graph.start([sys.executable, str(tmp_path / 'detector.py')])
         graph.hears('yolo_bounding_box:data', BOXES, TRACKS)
 

@@ -15,7 +15,7 @@ from ros_3d_bb_lab.evaluation.demo.scene_report import (BOXES_TOPIC, TRACKS_TOPI
                                                         write_csv, write_report)
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images
 from ros_3d_bb_lab.simulation.scenario import scenario_from
-from support.bags import changed_bag
+from support.bags import changed_bag, scene_bag
 
 SCENE = {'duration': 1.0, 'rate': 10.0, 'people': [{'start': [3.0, 1.0], 'moves': [{'to': [3.0, -1.0]}]}],
          'robot': {'moves': [{'to': [1.0, 0.0]}]}}
@@ -94,7 +94,7 @@ def write_unindexed(path):
 
 
 @pytest.mark.parametrize('make, reason', [
-    (lambda path: write_bag(scenario_images(scenario_from(SCENE)), path), 'no messages on /ros_3d_bb/tracks'),
+    (lambda path: scene_bag(path, SCENE), 'no messages on /ros_3d_bb/tracks'),
     (lambda path: write_bag(images_with_tracks('odom'), path), 'frames map, odom'),
     (lambda _path: None, 'No such file'), (write_unindexed, 'rosbag reindex')])
 def test_unusable_bags_are_rejected(tmp_path, monkeypatch, make, reason):

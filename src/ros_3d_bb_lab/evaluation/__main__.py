@@ -6,6 +6,7 @@ dictionary. Errors that it raises are printed here.
 import argparse
 import importlib
 import json
+import signal
 import subprocess
 import sys
 
@@ -26,6 +27,7 @@ def main(words):
     module.add_options(parser)
     parser.add_argument('--json', metavar='FILE', help='also write the result to FILE')
     arguments = parser.parse_args(words[1:])
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # runs the cleanup, which ends all processes
     try:
         result = module.run(arguments)
         if arguments.json:

@@ -113,7 +113,7 @@ def _visible_s(visible_ns, all_ns, cameras):
     return float(np.sum(gaps_ns[gaps_ns <= LONGEST_GAP * period_ns])) / NS
 
 
-def table(scene_score):
+def table_of_people(scene_score):
     """Format the scores as a table of text: a header and rows, and a sentence on all images."""
     rows = [('%d' % person.person, '%.1f s' % person.visible_s, '%.0f %%' % (100 * person.followed),
              '%d' % person.switches, ' '.join(map(str, person.ids)) or '-', '%.3f m' % person.rmse_m,

@@ -1,9 +1,9 @@
-"""Report as one HTML file that contains its figures."""
+"""Report as one HTML file that contains its figures: the page, and its elements as HTML text."""
 import base64
 import html
 import mimetypes
-from typing import NamedTuple, Tuple
 
+# Figures and tables are numbered by the style.
 PAGE = '''<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1"><title>{title}</title><style>
@@ -15,6 +15,8 @@ th {{ border-bottom: 1px solid #888; }} td:first-child, th:first-child {{ text-a
 img {{ max-width: 100%; }} figure {{ margin: 1.5em 0; }}
 @media (max-width: 600px) {{ td, th {{ padding: 0.15em 0.25em; font-size: 0.85em; }} }}
 figcaption, .caption {{ color: #444; font-size: 0.9em; margin: 0.5em 0 0; }}
+figcaption::before {{ counter-increment: figure; content: "Figure " counter(figure) ": "; }}
+.caption::before {{ counter-increment: table; content: "Table " counter(table) ": "; }}
 </style></head><body>
 <h1>{title}</h1>
 {body}
@@ -22,58 +24,32 @@ figcaption, .caption {{ color: #444; font-size: 0.9em; margin: 0.5em 0 0; }}
 '''
 
 
-class Heading(NamedTuple):
-    text: str
+def html_report(title, elements):
+    """The page of a title and elements."""
+    return PAGE.format(title=html.escape(title), body='\n'.join(elements))
 
 
-class Paragraph(NamedTuple):
-    text: str
+def heading(text):
+    return '<h2>%s</h2>' % html.escape(text)
 
 
-class Table(NamedTuple):
-    """Table of text. The caption is above it."""
-
-    caption: str
-    header: Tuple[str, ...]
-    rows: Tuple[Tuple[str, ...], ...]
+def paragraph(text):
+    return '<p>%s</p>' % html.escape(text)
 
 
-class Figure(NamedTuple):
-    """PNG file in the folder of the report, and its caption."""
-
-    name: str
-    caption: str
-
-
-def html_report(title, blocks, folder):
-    """Render blocks as HTML text. Figures are read from a folder (pathlib.Path)."""
-    return PAGE.format(title=html.escape(title), body='\n'.join(_rendered(block, folder) for block in blocks))
+def figure(path, caption):
+    """The figure in an image file (pathlib.Path)."""
+    data, caption = base64.b64encode(path.read_bytes()).decode(), html.escape(caption)
+    return '<figure><img src="data:%s;base64,%s" alt="%s"><figcaption>%s</figcaption></figure>' % (
+        mimetypes.guess_type(path.name)[0], data, caption, caption)
 
 
-def _rendered(block, folder):
-    if isinstance(block, Heading):
-        return '<h2>%s</h2>' % html.escape(block.text)
-    if isinstance(block, Paragraph):
-        return '<p>%s</p>' % html.escape(block.text)
-    caption = html.escape(block.caption)
-    if isinstance(block, Figure):
-        data = base64.b64encode((folder / block.name).read_bytes()).decode()
-        return '<figure><img src="data:%s;base64,%s" alt="%s"><figcaption>%s</figcaption></figure>' % (
-            mimetypes.guess_type(block.name)[0], data, caption, caption)
-    rows = [_row('th', block.header)] + [_row('td', row) for row in block.rows]
-    kind = ' class="pairs"' if len(block.header) == 2 else ''  # names and values, which may be text
-    return '<p class="caption">%s</p>\n<table%s>\n%s\n</table>' % (caption, kind, '\n'.join(rows))
+def table(caption, header, rows):
+    """Table of text, with the caption above it."""
+    lines = [_row('th', header)] + [_row('td', row) for row in rows]
+    kind = ' class="pairs"' if len(header) == 2 else ''  # names and values, which may be text
+    return '<p class="caption">%s</p>\n<table%s>\n%s\n</table>' % (html.escape(caption), kind, '\n'.join(lines))
 
 
 def _row(cell, texts):
     return '<tr>%s</tr>' % ''.join('<%s>%s</%s>' % (cell, html.escape(text), cell) for text in texts)
-
-
-def numbered(blocks):
-    """Number the captions of figures and tables."""
-    counts = {Figure: 0, Table: 0}
-    for block in blocks:
-        if type(block) in counts:
-            counts[type(block)] += 1
-            block = block._replace(caption='%s %d: %s' % (type(block).__name__, counts[type(block)], block.caption))
-        yield block

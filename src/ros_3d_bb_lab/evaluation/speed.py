@@ -182,19 +182,16 @@ def detector_speed(images, weights, runtimes=('torch', 'onnxruntime'), sizes=(64
     """
     if not len(images):
         raise ValueError('no images; at least one image is required to measure the speed of the detector')
-    cases = [(runtime, size, _detector(weights, runtime, size)) for runtime in runtimes for size in sizes]
-    for _image in range(DETECTOR_WARM_UPS):
-        for _runtime, _size, detector in cases:
-            detector.detect(images[0])
-    times_ms = [[_detector_time_ms(detector, image) for _runtime, _size, detector in cases] for image in images]
+    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_detector  # may import torch (slow)
+    cases = [(runtime, size) for runtime in runtimes for size in sizes]
+    detectors = [open_detector(weights, DetectionParams(image_size=size), RuntimeParams(runtime, 'cpu', threads=1))
+                 for runtime, size in cases]
+    times_ms = []
+    for image in [images[0]] * DETECTOR_WARM_UPS + list(images):
+        times_ms.append([_detector_time_ms(detector, image) for detector in detectors])
+    medians_ms = np.median(times_ms[DETECTOR_WARM_UPS:], axis=0).tolist()
     return [{'runtime': runtime, 'size': size, 'threads': 1, 'cpu_ms': cpu_ms, 'wall_ms': wall_ms}
-            for (runtime, size, _detector), (cpu_ms, wall_ms) in zip(cases, np.median(times_ms, axis=0).tolist())]
-
-
-def _detector(weights, runtime, size):
-    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_detector
-    running = RuntimeParams(runtime=runtime, device='cpu', threads=1)
-    return open_detector(weights, DetectionParams(image_size=size), running)
+            for (runtime, size), (cpu_ms, wall_ms) in zip(cases, medians_ms)]
 
 
 def _detector_time_ms(detector, image):

@@ -3,10 +3,9 @@
 Scenes are rendered and tracked first. Then their tracks and transforms are played on simulated time to
 planner_bridge_node and a costmap_2d_node with the people layer of config/move_base/local_costmap.yaml.
 """
-import contextlib
 import os
+import subprocess
 import sys
-import tempfile
 import time
 from typing import NamedTuple, Tuple
 
@@ -27,8 +26,7 @@ from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb_lab.evaluation.costmap.costmap_score import Costmap, Sighting, score_costmaps
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, add_scenarios, describe_machine, scene_name
 from ros_3d_bb_lab.evaluation.launching import free_port, running_roslaunch
-from ros_3d_bb_lab.evaluation.scene_benchmark import RANGE_M, depth_detector, yolov5_detector
-from ros_3d_bb_lab.evaluation.scenes import run_scene
+from ros_3d_bb_lab.evaluation.scene_benchmark import RANGE_M, depth_detector, run_scene, yolov5_detector
 from ros_3d_bb_lab.evaluation.text_table import line_of
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import BASE_FRAME, MAP_FRAME, ODOM_FRAME
 from ros_3d_bb_lab.simulation.scenario import read_scenario
@@ -55,7 +53,7 @@ LAUNCH = """<launch>
 
 
 class Scene(NamedTuple):
-    """A tracked scene: its name, the Simulator, a Step per image (`scenes.Step`), and the range of the detector."""
+    """A tracked scene: its name, the Simulator, a `scene_benchmark.Step` per image, and the range of the detector."""
 
     name: str
     simulator: Simulator
@@ -163,11 +161,14 @@ def _costmap(scene, grid, start_ns):
 
 
 def play_scenes(paths, launch, make_player, yolov5=None):
-    """Score the costmaps of each scenario, in a file, with the nodes of a launch file and the Player that is made."""
+    """Score the costmaps of each scenario, in a file, with the nodes of `launch` (XML) and the Player that is made."""
     print(describe_machine(), flush=True)
     scenes = [tracked_scene(path, yolov5) for path in paths]
-    results = {}
-    with running_nodes(launch):
+    results, port = {}, free_port()
+    os.environ['ROS_MASTER_URI'] = 'http://localhost:%d' % port
+    with running_roslaunch(['-'], port, sys.stderr, stdin=subprocess.PIPE) as process:
+        with process.stdin as stream:
+            stream.write(launch.encode())
         rospy.init_node('costmap_benchmark', disable_signals=True)
         player = make_player()
         player.start(scenes[0])
@@ -181,18 +182,6 @@ def run(arguments):
     """Score the costmaps of each scene."""
     yolov5 = yolov5_detector(arguments.weights) if arguments.weights else None
     return play_scenes(arguments.scenarios, LAUNCH, Player, yolov5)
-
-
-@contextlib.contextmanager
-def running_nodes(launch):
-    """Context in which roscore and the nodes of a launch file run on a free port."""
-    with tempfile.TemporaryDirectory() as folder:
-        path, port = os.path.join(folder, 'costmap.launch'), free_port()
-        with open(path, 'w') as stream:
-            stream.write(launch)
-        os.environ['ROS_MASTER_URI'] = 'http://localhost:%d' % port
-        with running_roslaunch([path], port, sys.stderr):
-            yield
 
 
 def add_options(parser):

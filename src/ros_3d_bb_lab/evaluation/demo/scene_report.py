@@ -19,8 +19,8 @@ from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, T
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb.visualization.image_overlay import draw_boxes, draw_caption
-from ros_3d_bb_lab.evaluation.clear_mot import Moment, score, table
-from ros_3d_bb_lab.evaluation.html_report import Figure, Paragraph, Table, html_report
+from ros_3d_bb_lab.evaluation.clear_mot import Moment, score, table_of_people
+from ros_3d_bb_lab.evaluation.html_report import figure, html_report, paragraph, table
 from ros_3d_bb_lab.evaluation.text_table import lines_of
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import BASE_FRAME, MAP_FRAME, ODOM_FRAME, TRUTH_TOPIC
 
@@ -84,7 +84,7 @@ def read_recording(bag):
 
 
 def table_of_tracks(moments):
-    """Format the times for which the tracks of a list of Moment are visible, as `clear_mot.table`."""
+    """Format the times for which the tracks of a list of Moment are visible, as `clear_mot.table_of_people`."""
     stamps = {}
     for moment in moments:
         for track in moment.tracks:
@@ -206,7 +206,7 @@ def write_report(bag_path, picture_path, color_topic=''):
     """
     with rosbag.Bag(bag_path) as bag:
         recording = read_recording(bag)
-        header, rows, summary = (table(score(recording.moments, recording.cameras)) if recording.has_truth
+        header, rows, summary = (table_of_people(score(recording.moments, recording.cameras)) if recording.has_truth
                                  else table_of_tracks(recording.moments))
         summary = '; '.join(filter(None, (summary, '%d of %d images answered' % (
             recording.answered, len(recording.moments)), why_empty(recording))))
@@ -214,12 +214,11 @@ def write_report(bag_path, picture_path, color_topic=''):
         people, tracks = paths_of(recording)
         draw_scene(picture_path, panels_of(bag, recording, color_topic), people, tracks, recording.robot, lines)
     picture = pathlib.Path(picture_path)
-    legend = LEGEND + (TRUTH_LEGEND if recording.has_truth else '') + SEE_ALSO
-    blocks = (Figure(picture.name, 'Images with 2D boxes, and paths in the map'), Paragraph(summary + '.'),
-              Paragraph(legend),
-              Table('People and their tracks' if recording.has_truth else 'Tracks', header, tuple(rows)))
-    title = 'Tracks in %s' % os.path.basename(bag_path)
-    picture.with_suffix('.html').write_text(html_report(title, blocks, picture.parent), encoding='utf-8')
+    elements = (figure(picture, 'Images with 2D boxes, and paths in the map'), paragraph(summary + '.'),
+                paragraph(LEGEND + (TRUTH_LEGEND if recording.has_truth else '') + SEE_ALSO),
+                table('People and their tracks' if recording.has_truth else 'Tracks', header, rows))
+    page = html_report('Tracks in %s' % os.path.basename(bag_path), elements)
+    picture.with_suffix('.html').write_text(page, encoding='utf-8')
     return lines
 
 

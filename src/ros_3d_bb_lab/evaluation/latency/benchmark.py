@@ -1,8 +1,6 @@
 """Latency of the complete pipeline, from the image stamp to the markers, by detector and CPU load."""
 import contextlib
-import json
 import os
-import signal
 import subprocess
 import sys
 import tempfile
@@ -10,7 +8,7 @@ from typing import NamedTuple
 
 from ros_3d_bb_lab.evaluation.defaults import default_weights, describe_machine, in_range, scenario_path
 from ros_3d_bb_lab.evaluation.latency.latency_result import LIMIT, result_of
-from ros_3d_bb_lab.evaluation.launching import launch
+from ros_3d_bb_lab.evaluation.launching import recorded
 from ros_3d_bb_lab.evaluation.text_table import line_of, table_of
 
 IMAGES = 60  # first images of the demo, played forwards and backwards: 2 s, 90 MB
@@ -44,21 +42,13 @@ def measured(case, arguments, bag, folder):
 
     Raises RuntimeError if nothing was measured.
     """
-    record, log = (os.path.join(folder, case.name + suffix) for suffix in ('.json', '.log'))
-    options = {'bag': bag, 'record': record, 'detector': case.detector, 'weights': case.weights,
-               'image_size': case.image_size, 'seconds': arguments.seconds, 'rate': arguments.rate,
-               'single_process': not arguments.separate,
+    options = {'bag': bag, 'detector': case.detector, 'weights': case.weights, 'image_size': case.image_size,
+               'seconds': arguments.seconds, 'rate': arguments.rate, 'single_process': not arguments.separate,
                'limits': arguments.limits, 'warm_up': 8.0 if arguments.limits else 3.0}
-    with cpu_load(int(case.loaded)), open(log, 'w') as stream:
-        launch('latency.launch', options, arguments.seconds + 200, stream)
-    try:
-        with open(record) as stream:
-            recorded = json.load(stream)
-    except OSError:
-        with open(log) as stream:
-            raise RuntimeError('%s: nothing was measured. The log:\n%s' % (case.name, stream.read()))
+    with cpu_load(int(case.loaded)):
+        record = recorded('latency.launch', options, os.path.join(folder, case.name), arguments.seconds + 200)
     result = dict(name=case.name, detector=case.name.split('+')[0], load='one core' if case.loaded else 'none')
-    result.update(result_of(recorded), load_average=recorded['load_average'])
+    result.update(result_of(record), load_average=record['load_average'])
     nodes = [node for node in result['cpu_percent'] if node not in HARNESS and not node.endswith(LIMIT)]
     return dict(result, pipeline={key: sum(result[key][node] for node in nodes) for key in ('cpu_percent', 'rss_mb')})
 
@@ -92,7 +82,6 @@ def print_result(result):
 def run(arguments):
     """Measure each case."""
     cases = _cases(arguments)
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # runs the cleanup, which ends all processes
     print(describe_machine(), flush=True)
     results = []
     with tempfile.TemporaryDirectory() as folder:

@@ -5,7 +5,7 @@ import json
 import os
 import time
 from typing import NamedTuple
-from xmlrpc.client import ServerProxy
+from xmlrpc.client import Fault, ServerProxy
 
 import rospy
 from sensor_msgs.msg import CameraInfo
@@ -40,19 +40,6 @@ class LatencyProbeNode(object):
 
     Afterwards the node writes the record and exits. Parameters: see `LatencyProbeParams`; launch/latency.launch. Format
     of the record: see `ros_3d_bb_lab.evaluation.latency.latency_result.result_of`.
-
-    Subscribes
-    ----------
-    camera/color/camera_info : sensor_msgs/CameraInfo
-        Represents the images.
-    yolo_bounding_box : std_msgs/Int32MultiArray
-        2D boxes.
-    ros_3d_bb/bb_3d : ros_3d_bb/BoundingBox3DArray
-        3D boxes.
-    ros_3d_bb/tracks : ros_3d_bb/TrackedObjectArray
-        Tracks.
-    visualization_marker_array : visualization_msgs/MarkerArray
-        Markers.
     """
 
     def __init__(self):
@@ -106,12 +93,18 @@ def stamp_in(message):
 
 def pids_of_nodes():
     """Process IDs of all nodes of this master, {name of the node without leading slash: process ID}."""
-    master, pids = rospy.get_master(), {}
-    _code, _text, state = master.getSystemState()
-    for node in sorted(set(node for kind in state for _name, nodes in kind for node in nodes)):
-        _code, _text, uri = master.lookupNode(node)
-        pids[node.lstrip('/')] = ServerProxy(uri).getPid(rospy.get_name())[2]
-    return pids
+    _code, _text, state = rospy.get_master().getSystemState()
+    nodes = sorted(set(node for kind in state for _name, nodes in kind for node in nodes))
+    return {node.lstrip('/'): pid_of(node) for node in nodes}
+
+
+def pid_of(node):
+    """Process ID of a node; None if it does not respond."""
+    code, _status, uri = rospy.get_master().lookupNode(node)
+    try:
+        return ServerProxy(uri).getPid(rospy.get_name())[2] if code == 1 else None
+    except (OSError, Fault):
+        return None
 
 
 def usage_of(pid):

@@ -27,21 +27,6 @@ class ReplayNode(object):
     """Play the images of a bag forwards and backwards, which avoids jumps, with the time of publication as stamp.
 
     The bag must be from `scenario_to_bag` or `session_to_bag`. Parameters: see `ReplayParams`; launch/latency.launch.
-
-    Publishes
-    ---------
-    camera/color/image_raw : sensor_msgs/Image
-        Colour image.
-    camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
-        Depth image, aligned to colour.
-    camera/color/camera_info : sensor_msgs/CameraInfo
-        Intrinsics of the colour camera.
-    camera/aligned_depth_to_color/camera_info : sensor_msgs/CameraInfo
-        The same intrinsics, because depth is aligned to colour.
-    /tf : tf2_msgs/TFMessage
-        From the map to the camera.
-    yolo_bounding_box : std_msgs/Int32MultiArray
-        2D boxes in the bag; only with ~boxes.
     """
 
     def __init__(self):

@@ -1,15 +1,12 @@
 """Closed loop: move_base drives a simulated robot among people, with different knowledge of them."""
 import argparse
-import json
 import os
-import signal
-import sys
 import tempfile
 
 import yaml
 
 from ros_3d_bb_lab.evaluation.defaults import describe_machine, in_range
-from ros_3d_bb_lab.evaluation.launching import launch
+from ros_3d_bb_lab.evaluation.launching import recorded
 from ros_3d_bb_lab.evaluation.navigation.navigation_scenes import CAMERAS, GOAL_M, RATE_HZ, SCENES, scenario_of
 from ros_3d_bb_lab.evaluation.navigation.trial_result import summaries
 from ros_3d_bb_lab.evaluation.text_table import line_of, table_of
@@ -26,36 +23,22 @@ def run_trial(scene, mode, seed, folder, arguments):
     Returns its record as a dictionary, with `scene`, `mode` and `seed`. Raises RuntimeError if there is no record.
     """
     name = os.path.join(folder, '%s-%s-%d' % (scene, mode, seed))
-    if not os.path.exists(name + '.json'):
-        _launch_trial(scene, mode, seed, name, arguments)
-    try:
-        with open(name + '.json') as stream:
-            return dict(json.load(stream), scene=scene, mode=mode, seed=seed)
-    except OSError:
-        with open(name + '.log') as stream:
-            raise RuntimeError('%s, %s, seed %d: no result. The end of the log:\n%s'
-                               % (scene, mode, seed, stream.read()[-3000:]))
-
-
-def _launch_trial(scene, mode, seed, name, arguments):
-    """Run a trial, which writes `name`.json."""
     with open(name + '.yaml', 'w') as stream:
         yaml.safe_dump(scenario_of(scene, seed, arguments.rate, () if mode == 'thesis' else CAMERAS), stream)
-    launch_arguments = {'scenario': name + '.yaml', 'record': name + '.json', 'mode': mode, 'goal_x': GOAL_M[0],
-                        'goal_y': GOAL_M[1], 'local_planner': arguments.planner}
+    launch_arguments = {'scenario': name + '.yaml', 'mode': mode, 'goal_x': GOAL_M[0], 'goal_y': GOAL_M[1],
+                        'local_planner': arguments.planner}
     if arguments.detector == 'depth':
         launch_arguments['detector'] = 'depth'
     elif arguments.detector != TRUE_BOXES:
         launch_arguments.update(detector='yolov5', weights=os.path.abspath(arguments.detector))
-    with open(name + '.log', 'w') as log:
-        launch('navigation_benchmark.launch', launch_arguments, TRIAL_TIMEOUT_S, log)
+    record = recorded('navigation_benchmark.launch', launch_arguments, name, TRIAL_TIMEOUT_S)
+    return dict(record, scene=scene, mode=mode, seed=seed)
 
 
 def run(arguments):
     """Run all trials."""
     if arguments.detector not in (TRUE_BOXES, 'depth') and not os.path.isfile(arguments.detector):
         raise ValueError('--detector %s: exact, depth or the path of a file expected' % arguments.detector)
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # runs the cleanup, which ends all processes
     print(describe_machine(), flush=True)
     trials = []
     with tempfile.TemporaryDirectory() as folder:

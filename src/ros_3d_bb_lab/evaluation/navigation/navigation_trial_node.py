@@ -55,52 +55,13 @@ class NavigationTrialNode(object):
     The node controls the time of the simulator: it is at most 0.2 s ahead of the newest inputs that tracker and planner
     have processed, so that they keep up on a slow machine, too. Parameters: see
     `NavigationTrialParams`; launch/navigation_benchmark.launch.
-
-    Subscribes
-    ----------
-    /tf : tf2_msgs/TFMessage
-        True pose of the robot, from the simulator.
-    odom : nav_msgs/Odometry
-        Speed of the robot.
-    clearance : std_msgs/Float32
-        Distance to the nearest person.
-    collisions : std_msgs/UInt32
-        Number of collisions.
-    cmd_vel : geometry_msgs/Twist
-        Commands of move_base, which show how far it has got.
-    ros_3d_bb/tracks : ros_3d_bb/TrackedObjectArray
-        Tracks, which show how far the tracker has got; only with ~tracks.
-    ros_3d_bb/bb_3d : ros_3d_bb/BoundingBox3DArray
-        3D boxes of each camera of the scenario, which show how far its nodes have got; only with ~boxes.
-    camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
-        Depth images of each camera of the scenario; only with ~cloud.
-    camera/aligned_depth_to_color/camera_info : sensor_msgs/CameraInfo
-        Their intrinsics; only with ~cloud.
-    ground_truth : ros_3d_bb/TrackedObjectArray
-        True people, from the simulator; only with ~visible or ~scan.
-    move_base/local_costmap/costmap : nav_msgs/OccupancyGrid
-        Shows that move_base has started.
-
-    Publishes
-    ---------
-    map : nav_msgs/OccupancyGrid
-        Walls and furniture of the scene, latched.
-    move_base_simple/goal : geometry_msgs/PoseStamped
-        Goal in the map.
-    camera/points : sensor_msgs/PointCloud2
-        Points of the depth images of each camera; only with ~cloud.
-    ros_3d_bb/tracks : ros_3d_bb/TrackedObjectArray
-        True tracks of the people in view of a camera; only with ~visible.
-    scan : sensor_msgs/LaserScan
-        Scan of an ideal laser at the centre of the robot; only with ~scan.
-    simulator_node/time_limit : std_msgs/Time
-        Time that the simulator does not exceed.
     """
 
     def __init__(self):
         self._params, = read_params(NavigationTrialParams)
         self._scenario = read_scenario(self._params.scenario)
-        self._pace, self._costmap_seen, self._cameras = Pace(), False, {}
+        self._pace, self._cameras = Pace(), {}
+        self._sources = []  # names of the inputs of move_base for which the time waits
         self._pose, self._speeds_mps, self._clearances_m = None, [], []
         self._collisions, self._driving_collisions = 0, 0
         self._map_pub = rospy.Publisher('map', OccupancyGrid, queue_size=1, latch=True)
@@ -111,7 +72,8 @@ class NavigationTrialNode(object):
         rospy.Subscriber('clearance', Float32, lambda message: self._clearances_m.append(message.data))
         rospy.Subscriber('collisions', UInt32, self._on_collisions)
         rospy.Subscriber('cmd_vel', Twist, lambda _message: self._pace.heard('commands', self._now_ns()))
-        rospy.Subscriber('move_base/local_costmap/costmap', OccupancyGrid, self._on_costmap)
+        rospy.Subscriber('move_base/local_costmap/costmap', OccupancyGrid,
+                         lambda _message: self._pace.heard('costmap', self._now_ns()))
         if self._params.tracks:
             self._wait_for('tracks', TRACKS_TOPIC, TrackedObjectArray)
         if self._params.boxes:
@@ -122,13 +84,16 @@ class NavigationTrialNode(object):
             self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=10)
             rospy.Subscriber(TRUTH_TOPIC, TrackedObjectArray, self._publish_visible)
         if self._params.scan:
+            self._sources.append('scan')
             self._scan_pub = rospy.Publisher('scan', LaserScan, queue_size=10)
             rospy.Subscriber(TRUTH_TOPIC, TrackedObjectArray, self._publish_scan)
         if self._params.cloud:
+            self._sources.append('cloud')
             for mount in self._scenario.robot.mounts:
                 self._convert_depth_of(mount.name)
 
     def _wait_for(self, source, topic, kind):
+        self._sources.append(source)
         rospy.Subscriber(topic, kind, lambda message: self._pace.heard(source, message.header.stamp.to_nsec()))
 
     def _convert_depth_of(self, camera):
@@ -151,10 +116,10 @@ class NavigationTrialNode(object):
             rospy.logfatal('move_base, tracker or camera did not start within %.0f s; there is no result',
                            START_TIMEOUT_S)
             return
-        start_ns, sources = self._now_ns(), self._sources()
+        start_ns = self._now_ns()
         self._speeds_mps, self._clearances_m = [], []
         self._goal_pub.publish(goal_message(self._params, time_from(start_ns)))
-        self._pace.start(start_ns, ['commands'] + sources)
+        self._pace.start(start_ns, ['commands'] + self._sources)
         time_to_goal_s = self._drive(start_ns)
         if rospy.is_shutdown():
             return  # interrupted: there is no result
@@ -164,18 +129,12 @@ class NavigationTrialNode(object):
         with open(self._params.record, 'w') as stream:
             json.dump(result, stream)
 
-    def _sources(self):
-        """Names of the inputs of move_base for which the time waits."""
-        cameras = self._scenario.robot.mounts if self._params.boxes else ()
-        return ([name for name in ('tracks', 'cloud', 'scan') if getattr(self._params, name)]
-                + ['boxes ' + mount.name for mount in cameras])
-
     def _started(self):
         """Wait until everything runs. Returns whether it does."""
         deadline_s, ready_ns = time.monotonic() + START_TIMEOUT_S, None
-        wanted = set(self._sources())
+        wanted = {'costmap', *self._sources}
         while time.monotonic() < deadline_s and not rospy.is_shutdown():
-            is_ready = (self._costmap_seen and self._pose is not None and wanted <= self._pace.sources
+            is_ready = (wanted <= self._pace.sources and self._pose is not None
                         and self._goal_pub.get_num_connections() and self._limit_pub.get_num_connections())
             ready_ns = (ready_ns or self._now_ns()) if is_ready else None
             if is_ready and self._now_ns() > ready_ns + WARM_UP_S * NS:
@@ -210,9 +169,6 @@ class NavigationTrialNode(object):
         if message.data > self._collisions:
             self._driving_collisions += was_driving(self._speeds_mps)
         self._collisions = message.data
-
-    def _on_costmap(self, _message):
-        self._costmap_seen = True
 
     def _on_depth(self, camera, cloud_pub, message):
         if camera in self._cameras:

@@ -5,10 +5,9 @@ import numpy as np
 
 from ros_3d_bb.estimation.error_model import write_error_model
 from ros_3d_bb.sessions.plausibility import position_text
-from ros_3d_bb_lab.evaluation.html_report import Figure, Heading, Paragraph, Table, html_report, numbered
-from ros_3d_bb_lab.evaluation.noise.analysis import summary_of
+from ros_3d_bb_lab.evaluation.html_report import figure, heading, html_report, paragraph, table
+from ros_3d_bb_lab.evaluation.noise.analysis import LEAST_TO_TEST, summary_of
 from ros_3d_bb_lab.evaluation.noise.figures import polynomial_text, write_figures
-from ros_3d_bb_lab.evaluation.noise.statistics import LEAST_TO_TEST
 from ros_3d_bb_lab.evaluation.noise.tables import LEAST_IN_CLUSTER, small_clusters
 
 TITLE = 'Position errors of a depth camera'
@@ -22,12 +21,10 @@ def write_results(folder, analysis):
     The folder is created if it does not exist. The error model of an earlier analysis does not remain. Raises OSError.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    captions = write_figures(folder, analysis)
+    figures = {name: figure(folder / name, caption) for name, caption in write_figures(folder, analysis).items()}
     sections = _summary, _setup, _left_out, _z, _x, _model, _distributions
-    blocks = [block for section in sections for block in section(analysis)]
-    blocks = list(numbered(block._replace(caption=captions[block.name]) if isinstance(block, Figure) else block
-                           for block in blocks if not isinstance(block, Figure) or block.name in captions))
-    (folder / 'report.html').write_text(html_report(TITLE, blocks, folder), encoding='utf-8')
+    elements = [element for section in sections for element in section(analysis, figures)]
+    (folder / 'report.html').write_text(html_report(TITLE, elements), encoding='utf-8')
     (folder / 'summary.json').write_text(json.dumps(summary_of(analysis), indent=1), encoding='utf-8')
     model_path = folder / 'error_model.yaml'
     if analysis.model is not None:
@@ -44,7 +41,7 @@ def text_of(analysis):
         for name, axis, variances in (('z', analysis.z, analysis.z), ('x', analysis.x, analysis.x_variance)))
 
 
-def _summary(analysis):
+def _summary(analysis, _figures):
     model = analysis.model
     rows = [('measurements (mean error)', _count(analysis.x), _count(analysis.z)),
             ('measurements (variance)', _count(analysis.x_variance), _count(analysis.z)),
@@ -58,15 +55,15 @@ def _summary(analysis):
         rows.append(('RMSE after correction, positions left out [m]', '%.3f' % model.cross_validated.rmse_x_m,
                      '%.3f' % model.cross_validated.rmse_z_m))
     pieces = [
-        Paragraph('This report describes how far positions of people, as measured by a depth camera, are from their '
+        paragraph('This report describes how far positions of people, as measured by a depth camera, are from their '
                   'true positions, and a model of these errors. Error is measured minus true. X is to the right of the '
-                  'camera and Z ahead of it, in its optical frame.'), Table('main results', header, tuple(rows))]
+                  'camera and Z ahead of it, in its optical frame.'), table('main results', header, rows)]
     text = _bias_text(analysis)
     if model is not None:
         text += (' Validated at positions that were not used for the fit, the 95 %% ellipse of the model contains '
                  '%.0f %% of the measurements, and the remaining error in the plane is %.3f m (RMSE).'
                  % (100 * model.cross_validated.coverage_95, model.cross_validated.rmse_plane_m))
-    return pieces + [Paragraph(text)]
+    return pieces + [paragraph(text)]
 
 
 def _bias_text(analysis):
@@ -80,15 +77,15 @@ def _bias_text(analysis):
                 '' if analysis.model is None else ' The error model corrects the mean error.'))
 
 
-def _setup(analysis):
+def _setup(analysis, figures):
     inputs = analysis.inputs
     camera, complete = inputs.z.camera, inputs.z.complete()
     positions = len(set(map(tuple, complete.truth_m.tolist())))
     rows = [('date of the analysis', analysis.date),
             ('dates of the measurements (UTC)', inputs.z.dates or 'not stored'),
             ('camera', inputs.camera), ('estimator', ESTIMATORS.get(inputs.estimator, inputs.estimator)),
-            ('measurements from', ', '.join(sorted(set(str(table.name) for table in (
-                inputs.z, inputs.x, inputs.x_variance))))),
+            ('measurements from', ', '.join(sorted(set(
+                str(source.name) for source in (inputs.z, inputs.x, inputs.x_variance))))),
             ('measurements', '%d used with X and Z, at %d positions' % (len(complete.truth_m), positions)),
             ('left out', 'rejected or unusable: %d, outliers: %d' % (len(inputs.z.left_out), len(inputs.outliers)))]
     if camera is not None:
@@ -98,90 +95,90 @@ def _setup(analysis):
                      np.degrees(2 * np.arctan(size / (2 * focal))) for focal, size in zip(camera[2:4], camera[:2]))),
                  ('distortion', '%s: %s' % (camera.distortion_model, ', '.join(
                      '%g' % value for value in camera.distortion)) if camera.distortion else 'none')]
-    return [Heading('Measurements and camera'), Table('measurements and camera', ('', 'value'), tuple(rows)),
-            Paragraph('A cluster is the set of all measurements with one true value of X, or of Z. Clusters of fewer '
+    return [heading('Measurements and camera'), table('measurements and camera', ('', 'value'), rows),
+            paragraph('A cluster is the set of all measurements with one true value of X, or of Z. Clusters of fewer '
                       'than %d measurements are left out of the statistics of that axis.' % LEAST_IN_CLUSTER),
-            Figure('layout.png', '')]
+            figures.get('layout.png', '')]  # not of tables of one axis
 
 
-def _left_out(analysis):
+def _left_out(analysis, _figures):
     inputs = analysis.inputs
     reasons = {}
     for name, reason in inputs.z.left_out:
         reasons.setdefault(reason, []).append(name)
     rows = [(str(len(names)), reason, ', '.join(names)) for reason, names in sorted(reasons.items())]
     rows += [(str(len(cluster.error_m)), 'fewer than %d with %s = %.2f m' % (LEAST_IN_CLUSTER, axis, cluster.truth_m),
-              'statistics of %s only' % axis) for axis, table in (('Z', inputs.z), ('X', inputs.x_variance))
-             for cluster in small_clusters(table, axis)]
-    pieces = [Heading('Measurements that were left out')]
-    pieces.append(Table('rejected and unusable measurements', ('number', 'reason', 'measurements'), tuple(rows)) if rows
-                  else Paragraph('No measurement was rejected, and none was unusable.'))
+              'statistics of %s only' % axis) for axis, errors in (('Z', inputs.z), ('X', inputs.x_variance))
+             for cluster in small_clusters(errors, axis)]
+    pieces = [heading('Measurements that were left out')]
+    pieces.append(table('rejected and unusable measurements', ('number', 'reason', 'measurements'), rows) if rows
+                  else paragraph('No measurement was rejected, and none was unusable.'))
     if not inputs.outliers:
-        return pieces + [Paragraph('There are no outliers: no true position is implausible.')]
+        return pieces + [paragraph('There are no outliers: no true position is implausible.')]
     return pieces + [
-        Paragraph('Outliers have a true position whose error is far from what the other measurements make likely: '
+        paragraph('Outliers have a true position whose error is far from what the other measurements make likely: '
                   'probably a slip in the entry, or the box of another person. They are left out of all results.'),
-        Table('outliers', ('measurement', 'true', 'estimate', 'would be plausible'), tuple(
+        table('outliers', ('measurement', 'true', 'estimate', 'would be plausible'), [
             (outlier.name, position_text(outlier.truth_m), position_text(outlier.measured_m),
-             '–' if outlier.intended_m is None else position_text(outlier.intended_m)) for outlier in inputs.outliers))]
+             '–' if outlier.intended_m is None else position_text(outlier.intended_m)) for outlier in inputs.outliers])]
 
 
-def _z(analysis):
-    return [Heading('Errors in Z, the distance ahead'),
-            Paragraph('f(z) = %s metres, fitted to the mean errors of the clusters with equal weights.'
+def _z(analysis, figures):
+    return [heading('Errors in Z, the distance ahead'),
+            paragraph('f(z) = %s metres, fitted to the mean errors of the clusters with equal weights.'
                       % polynomial_text(analysis.z.poly, 'z')),
-            Figure('z_error.png', ''), _cluster_table(analysis.z, 'Z', 'errors in Z by true Z'),
-            Figure('z_variance.png', '')]
+            figures['z_error.png'], _cluster_table(analysis.z, 'Z', 'errors in Z by true Z'),
+            figures['z_variance.png']]
 
 
-def _x(analysis):
-    pieces = [Heading('Errors in X, to the side'),
-              Paragraph('f(x) = %s metres.' % polynomial_text(analysis.x.poly, 'x')),
-              Figure('x_error.png', ''), _cluster_table(analysis.x, 'X', 'errors in X by true X')]
+def _x(analysis, figures):
+    pieces = [heading('Errors in X, to the side'),
+              paragraph('f(x) = %s metres.' % polynomial_text(analysis.x.poly, 'x')),
+              figures['x_error.png'], _cluster_table(analysis.x, 'X', 'errors in X by true X')]
     if analysis.x_variance != analysis.x:
-        pieces += [Paragraph('The mean error is that of all measurements. Variance and distribution are those of the '
+        pieces += [paragraph('The mean error is that of all measurements. Variance and distribution are those of the '
                              '%s measurements of people who are not truncated by the image border.'
                              % _count(analysis.x_variance)),
                    _cluster_table(analysis.x_variance, 'X', 'errors in X of people who are not truncated')]
-    return pieces + [Figure('x_variance.png', '')]
+    return pieces + [figures['x_variance.png']]
 
 
-def _distributions(analysis):
+def _distributions(analysis, figures):
     tested = [cluster for _name, cluster in analysis.variance_clusters if cluster.tested]
     return [
-        Heading('Distribution of the errors'),
-        Paragraph('The Shapiro–Wilk test accepts a Gaussian for %d of %d tested clusters. It rejects a Gaussian if p '
+        heading('Distribution of the errors'),
+        paragraph('The Shapiro–Wilk test accepts a Gaussian for %d of %d tested clusters. It rejects a Gaussian if p '
                   '(in the tables of the clusters) is below 0.05. Small clusters are seldom rejected, which does not '
                   'prove that they are Gaussian. Clusters with fewer than %d measurements, or with equal errors, are '
                   'not tested.' % (sum(cluster.looks_gaussian for cluster in tested), len(tested), LEAST_TO_TEST)),
-        Figure('z_distribution.png', ''), Figure('x_distribution.png', '')]
+        figures['z_distribution.png'], figures['x_distribution.png']]
 
 
-def _model(analysis):
+def _model(analysis, figures):
     if analysis.model is None:
-        pieces = [Paragraph('%s%s.' % (analysis.model_note[:1].upper(), analysis.model_note[1:]))]
+        pieces = [paragraph('%s%s.' % (analysis.model_note[:1].upper(), analysis.model_note[1:]))]
     else:
-        pieces = _model_pieces(analysis.model)
-    return [Heading('Error model and its validation')] + pieces
+        pieces = _model_pieces(analysis.model, figures)
+    return [heading('Error model and its validation')] + pieces
 
 
-def _model_pieces(model):
+def _model_pieces(model, figures):
     scores, limits = model.cross_validated, model.measured_range
     z_bias = ' '.join('%+.4f%s' % (value, {0: '', 1: ' z', 2: ' z²', 3: ' z³'}[len(model.z_bias) - 1 - number])
                       for number, value in enumerate(model.z_bias))
     return [
-        Paragraph('error_model.yaml, in the folder of this report, is for bbox3d_node (error_model:=FILE), which '
+        paragraph('error_model.yaml, in the folder of this report, is for bbox3d_node (error_model:=FILE), which '
                   'removes the bias and sets the covariance of positions. It is fitted to the %d measurements with '
                   'X and Z, at %d positions with equal weights. Its number of coefficients was selected by '
                   'cross-validation. x and z are the true position in metres.' % model.provenance[-2:]),
-        Table('error model', ('part', 'value'), (
+        table('error model', ('part', 'value'), (
             ('bias of Z [m]', z_bias), ('bias of X [m]', '%+.4f x %+.4f x/z %+.4f' % model.x_bias),
             ('σ of Z [m]', _spread_text(model.z_sigma)), ('σ of X [m]', _spread_text(model.x_sigma)),
             ('measured range', 'Z from %.2f to %.2f m, |X| to %.2f m'
              % (limits.z_min_m, limits.z_max_m, limits.x_max_m)),
             ('outside of it', 'bias as at its limit; σ grows by %.1f m per metre' % model.growth_outside))),
-        Figure('sigma.png', ''),
-        Paragraph('Leave-one-position-out cross-validation: the measurements of each position are corrected by a model '
+        figures['sigma.png'],
+        paragraph('Leave-one-position-out cross-validation: the measurements of each position are corrected by a model '
                   'of all other positions. The coverage is the share of them inside the ellipse of that model; ideally '
                   'it is that of the ellipse. σ is widened until the 95 %% ellipse contains 95 %%, because errors have '
                   'longer tails than a Gaussian; the 68 %% ellipse then contains more, here %.0f %%.'
@@ -189,12 +186,12 @@ def _model_pieces(model):
 
 
 def _cluster_table(axis, name, caption):
-    return Table(caption, ('true %s [m]' % name, 'n', 'mean error [m]', 'standard deviation [m]', 'variance [m²]',
-                           'RMS [m]', 'Shapiro–Wilk p'),
-                 tuple(('%.2f' % cluster.truth_m, '%d' % cluster.count, '%+.4f' % cluster.mean_m,
-                        '%.4f' % cluster.sigma_m, '%.6f' % cluster.variance_m2, '%.4f' % cluster.rms_m,
-                        '%.4f' % cluster.shapiro_p if cluster.tested else 'not tested')
-                       for cluster in axis.clusters))
+    header = ('true %s [m]' % name, 'n', 'mean error [m]', 'standard deviation [m]', 'variance [m²]', 'RMS [m]',
+              'Shapiro–Wilk p')
+    return table(caption, header, [
+        ('%.2f' % cluster.truth_m, '%d' % cluster.count, '%+.4f' % cluster.mean_m, '%.4f' % cluster.sigma_m,
+         '%.6f' % cluster.variance_m2, '%.4f' % cluster.rms_m,
+         '%.4f' % cluster.shapiro_p if cluster.tested else 'not tested') for cluster in axis.clusters])
 
 
 def _spread_text(spread):

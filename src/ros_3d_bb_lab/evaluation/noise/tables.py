@@ -153,11 +153,10 @@ def read_session_measurements(folder, estimator):
     used = [(position_m, frame) for position_m, frame in rows if position_m is not None]
     if not used:
         raise ValueError('%s: no frame with ground truth and an estimate (%s)' % (folder, estimator))
-    return MeasurementTable(str(folder), np.array([position_m for position_m, _frame in used]),
-                            np.array([frame.truth_m for _position_m, frame in used]),
-                            np.array([_is_cut(frame, session.camera) for _position_m, frame in used]),
-                            tuple(frame.name for _position_m, frame in used), tuple(left_out), session.camera,
-                            _dates_of([frame for _position_m, frame in used]))
+    positions_m, frames = zip(*used)
+    return MeasurementTable(str(folder), np.array(positions_m), np.array([frame.truth_m for frame in frames]),
+                            np.array([_is_cut(frame, session.camera) for frame in frames]),
+                            tuple(frame.name for frame in frames), tuple(left_out), session.camera, _dates_of(frames))
 
 
 def _dates_of(frames):

@@ -16,8 +16,8 @@ from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
 from ros_3d_bb.tracking.types import CameraView, Detection
 from ros_3d_bb_lab.evaluation.defaults import data_folder, in_range
 from ros_3d_bb_lab.evaluation.text_table import line_of
-from ros_3d_bb_lab.evaluation.tracking.csv_tables import read_rows
 from ros_3d_bb_lab.evaluation.tracking.metrics import WITHIN_95
+from ros_3d_bb_lab.evaluation.tracking.trajectories import read_rows
 
 # Defaults, except that true positions are no depth of the background, and all are those of one person.
 PARAMS = TrackerParams(outlier_share=0.0, new_target_density=1e-9)

@@ -16,11 +16,10 @@ from ros_3d_bb.camera.camera_model import Camera, transform_from, transform_poin
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.association import assign, plane_distances
 from ros_3d_bb.tracking.types import OUT_OF_VIEW, VISIBLE, CameraView, Detection
-from ros_3d_bb_lab.evaluation.tracking.csv_tables import read_rows
 from ros_3d_bb_lab.evaluation.tracking.detection_generator import FALSE
 from ros_3d_bb_lab.evaluation.tracking.metrics import MATCHED_M
 from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S, UNSCORED_M, Image, RunTruth
-from ros_3d_bb_lab.evaluation.tracking.trajectories import pedestrian_of
+from ros_3d_bb_lab.evaluation.tracking.trajectories import pedestrian_of, read_rows
 
 TABLES = {'detections': 't_s,x_m,y_m,z_m,width_m,height_m,score', 'poses': 't_s,x_m,y_m,z_m,qx,qy,qz,qw',
           'truth': 't_s,id,x_m,y_m,z_m,width_m,height_m,counts',

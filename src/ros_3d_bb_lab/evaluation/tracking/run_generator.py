@@ -42,12 +42,7 @@ class Timing(NamedTuple):
     stall_s: float = 0.3
 
 
-class Models(NamedTuple):
-    """Models of a run."""
-
-    camera: CameraModel = CameraModel()
-    odometry: OdometryModel = OdometryModel()
-    timing: Timing = Timing()
+CAMERA, ODOMETRY, TIMING = CameraModel(), OdometryModel(), Timing()
 
 
 class RunTruth(NamedTuple):
@@ -114,7 +109,7 @@ class _Walks(NamedTuple):
     future_m: np.ndarray
 
 
-def simulate(sequence, motion, seed, models=Models(), seconds=SECONDS):
+def simulate(sequence, motion, seed, seconds=SECONDS):
     """Simulate a run of a robot among the people of a sequence. Returns a Run.
 
     `motion` is STANDING or DRIVING, `seed` an int or a sequence of int, and `seconds` the maximum duration.
@@ -123,12 +118,12 @@ def simulate(sequence, motion, seed, models=Models(), seconds=SECONDS):
     random = np.random.RandomState(np.append(np.atleast_1d(seed), names).astype(np.uint32))
     first_s, last_s = sequence.span_s
     seconds = min(seconds, last_s - first_s)
-    start_s, true = _busiest(sequence, motion, seconds, models.camera, random)
-    odometry = odometry_of(true, models.odometry, random)
-    times_s = np.arange(0, seconds, 1 / models.timing.rate_hz)
+    start_s, true = _busiest(sequence, motion, seconds, CAMERA, random)
+    odometry = odometry_of(true, ODOMETRY, random)
+    times_s = np.arange(0, seconds, 1 / TIMING.rate_hz)
     walks = _walks(sequence.pedestrians, start_s + times_s)
-    images = _images(true, odometry, times_s, walks, models, random)
-    return Run('%s_%s' % (sequence.name, motion), models.camera, tuple(images))
+    images = _images(true, odometry, times_s, walks, random)
+    return Run('%s_%s' % (sequence.name, motion), CAMERA, tuple(images))
 
 
 def _busiest(sequence, motion, seconds, camera, random):
@@ -183,28 +178,28 @@ def _walks(pedestrians, times_s):
     return walks
 
 
-def _images(true, odometry, times_s, walks, models, random):
+def _images(true, odometry, times_s, walks, random):
     """Yield the received images in order. `true` and `odometry` are poses of the robot."""
-    timing, detector = models.timing, Detector(models.camera, walks.ended.shape[1], 1 / models.timing.rate_hz, random)
-    pose_noise = models.odometry.position_m, models.odometry.position_m, models.odometry.heading
+    detector = Detector(CAMERA, walks.ended.shape[1], 1 / TIMING.rate_hz, random)
+    pose_noise = ODOMETRY.position_m, ODOMETRY.position_m, ODOMETRY.heading
     arrived_s, stalled_until_s = -np.inf, -np.inf
     for row, time_s in enumerate(times_s):
         pose = pose_at(true, time_s)
         detector.advance(pose)
-        if random.uniform() < timing.stalls_hz / timing.rate_hz:
-            stalled_until_s = time_s + timing.stall_s
-        if random.uniform() < timing.lost_share or time_s < stalled_until_s:
+        if random.uniform() < TIMING.stalls_hz / TIMING.rate_hz:
+            stalled_until_s = time_s + TIMING.stall_s
+        if random.uniform() < TIMING.lost_share or time_s < stalled_until_s:
             continue
-        latency_s = max(timing.least_latency_s, random.normal(timing.latency_s, timing.latency_sigma_s))
-        arrived_s = max(time_s + latency_s, arrived_s + timing.least_gap_s)
-        truth, seen = _observe(walks, row, pose, pose_at(odometry, time_s), models.camera)
+        latency_s = max(TIMING.least_latency_s, random.normal(TIMING.latency_s, TIMING.latency_sigma_s))
+        arrived_s = max(time_s + latency_s, arrived_s + TIMING.least_gap_s)
+        truth, seen = _observe(walks, row, pose, pose_at(odometry, time_s), CAMERA)
         found = detector.find(seen, pose, time_s)
         measured, later = (pose_at(odometry, when_s) + random.normal(0, pose_noise) for when_s in (time_s, arrived_s))
-        view = view_of(measured, models.camera)
-        stamp_s = START_S + time_s + random.normal(0, timing.stamp_sigma_s)
+        view = view_of(measured, CAMERA)
+        stamp_s = START_S + time_s + random.normal(0, TIMING.stamp_sigma_s)
         stamp_ns, arrival_ns = (int(round(when_s * NS)) for when_s in (stamp_s, START_S + arrived_s))
-        yield Image(stamp_ns, [detection_of(box, view, models.camera) for box in found], view, truth,
-                    [box.source for box in found], arrival_ns, view_of(later, models.camera))
+        yield Image(stamp_ns, [detection_of(box, view, CAMERA) for box in found], view, truth,
+                    [box.source for box in found], arrival_ns, view_of(later, CAMERA))
 
 
 def _observe(walks, row, pose, odometry, camera):

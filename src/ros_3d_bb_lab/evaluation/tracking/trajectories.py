@@ -1,5 +1,6 @@
 """Trajectories of pedestrians in the plane: smoothed recordings, or generated trajectories if there are no recordings.
 """
+import csv
 import os
 from typing import Any, NamedTuple, Tuple
 
@@ -7,8 +8,6 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.sparse import csc_matrix, diags
 from scipy.sparse.linalg import spsolve
-
-from ros_3d_bb_lab.evaluation.tracking.csv_tables import read_rows
 
 COLUMNS = ('t_s', 'id', 'x_m', 'y_m')
 SMOOTHING = 0.004  # s^3; keeps the head motion of a step, removes the error of manual annotation in video
@@ -130,3 +129,27 @@ def _made(name, random, people, seconds):
             rows += [('%d.%d' % (number, companion), time_s) + tuple(point_m)
                      for time_s, point_m in zip(times_s, shifted_m) if 0 <= time_s <= seconds]
     return _sequence(name, name, rows)
+
+
+def read_rows(path, columns, texts=()):
+    """Rows of a CSV file as dictionaries with these columns, numbers except for `texts`. Other columns are ignored.
+
+    Raises ValueError if a column is missing or a value is not a number; the message names the file and the line.
+    """
+    with open(path, newline='', encoding='utf-8-sig') as stream:
+        reader = csv.DictReader(stream)
+        try:
+            if not set(columns) <= set(reader.fieldnames or ()):
+                raise ValueError('%s has the columns %s; %s expected'
+                                 % (path, ','.join(reader.fieldnames or ()), ','.join(columns)))
+            return [_row(path, reader.line_num, line, columns, texts) for line in reader]
+        except csv.Error as error:
+            raise ValueError('%s cannot be read as a table (%s)' % (path, error))
+
+
+def _row(path, number, line, columns, texts):
+    try:
+        return {key: line[key] if key in texts else float(line[key]) for key in columns}
+    except (TypeError, ValueError):
+        raise ValueError('%s, line %d: %s; a number in each column expected'
+                         % (path, number, ','.join(str(line[key]) for key in columns)))
