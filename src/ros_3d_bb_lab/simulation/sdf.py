@@ -5,7 +5,6 @@ The build may run this file with Python 2 and without any package.
 import math
 import sys
 import xml.etree.ElementTree as ElementTree
-from xml.dom import minidom
 
 SUN = {'pose': '0 0 10 0 0 0', 'diffuse': '0.8 0.8 0.8 1', 'specular': '0.2 0.2 0.2 1',
        'direction': '0.5 0.2 -0.85', 'cast_shadows': 'false'}
@@ -145,5 +144,4 @@ def people_world():
 
 
 if __name__ == '__main__':
-    with open(sys.argv[1], 'w') as stream:
-        stream.write(minidom.parseString(ElementTree.tostring(people_world())).toprettyxml('  '))
+    ElementTree.ElementTree(people_world()).write(sys.argv[1])
