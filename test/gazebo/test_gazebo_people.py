@@ -1,4 +1,4 @@
-"""Camera and tracks of the Jackal among the people of the world of gazebo.launch."""
+"""Camera and tracks of the Jackal among the people of worlds/people.world."""
 import numpy as np
 import pytest
 import rospy

@@ -13,7 +13,7 @@ from support.small_session import write_small_session
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 PROGRAMS = sorted(os.path.basename(path) for path in glob.glob(os.path.join(ROOT, 'scripts', '*'))) + ['annotator']
 NODES = [name for name in PROGRAMS if name.endswith('_node')]
-FOLDERS = ('launch', 'config', 'examples', 'rviz', 'msg', 'urdf')
+FOLDERS = ('launch', 'config', 'examples', 'rviz', 'msg', 'urdf', 'worlds')
 
 
 @pytest.fixture(scope='module')
@@ -57,7 +57,6 @@ def test_launch_config_rviz_and_scripts_are_installed(installed):
         assert files_in(os.path.join(share, folder)) == files_in(os.path.join(ROOT, folder))
     assert sorted(os.listdir(os.path.join(installed, 'lib', 'ros_3d_bb'))) == sorted(PROGRAMS)
     assert os.path.exists(os.path.join(share, 'LICENSE'))
-    assert os.path.exists(os.path.join(share, 'worlds', 'people.world'))
 
 
 @pytest.fixture(scope='module')

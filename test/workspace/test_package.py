@@ -24,7 +24,7 @@ FOR_MELODIC = {'python3-gnupg', 'python3-pycryptodome'}
 FOR_DEBIAN = {'tf2_tools'}  # which has programs of tf2_ros there
 OPTIONAL = {'move_base'}  # of navigation.launch, for robots that have it
 NODES = {node.name: node for node in node_pages.nodes()}
-INSTALLED = 'launch', 'config', 'rviz', 'urdf'
+INSTALLED = 'launch', 'config', 'rviz', 'urdf', 'worlds'
 REQUIRED_ARGUMENTS = ['weights:=yolov5n.pt', 'bag:=some.bag', 'session:=/some/session', 'record:=/some/record.json',
                       'camera_height:=1.2']
 

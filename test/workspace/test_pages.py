@@ -184,7 +184,7 @@ def test_named_files_and_launch_arguments_exist(page):
     known = set(argument.get('name') for path in glob.glob(os.path.join(ROOT, 'launch', '*'))
                 for argument in ElementTree.parse(path).iter('arg'))
     for code in re.findall(r'`([^`\n]+)`', prose_of(page)):
-        for path in re.findall(r'(?:^|\s)((?:config|doc|launch|msg|rviz|src|test|urdf)/[\w./]*\w)$', code):
+        for path in re.findall(r'(?:^|\s)((?:config|doc|launch|msg|rviz|src|test|urdf|worlds)/[\w./]*\w)$', code):
             assert glob.glob(os.path.join(ROOT, path)), path
         if ' ' not in code and not code.startswith('-'):
             assert set(re.findall(r'\b([a-z]\w*):=', code)) - known == set(), code
