@@ -160,7 +160,7 @@ def two_people(seconds):
 def robot(request):
     """The robot without people around it; the nodes run. The parameter is the local planner, by default dwa."""
     environment = planner_environment()
-    nodes = subprocess.Popen(['roslaunch', os.path.join(ROOT, 'test', 'support', 'navigation.launch'),
+    nodes = subprocess.Popen(['roslaunch', os.path.join(ROOT, 'test', 'support', 'social_costmap.launch'),
                               'local_planner:=' + getattr(request, 'param', 'dwa')], env=environment)
     driven = DrivenRobot()
     driven.social = Recorder('social_costmap/costmap/costmap', OccupancyGrid, publisher_expected=False)
