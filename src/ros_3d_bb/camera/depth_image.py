@@ -49,5 +49,6 @@ class DepthImage(NamedTuple):
 def _black_ends(lines):
     """Number of lines without depth at both ends of an array (lines, pixels); 0 if there are more than the widest."""
     widest = int(WIDEST_BORDER * len(lines))
-    return [int(np.logical_or.reduce(end > 0, axis=1).argmax())
-            for end in (lines[:widest + 1], lines[:-widest - 2:-1])]
+    with np.errstate(invalid='ignore'):  # nan
+        return [int(np.logical_or.reduce(end > 0, axis=1).argmax())
+                for end in (lines[:widest + 1], lines[:-widest - 2:-1])]

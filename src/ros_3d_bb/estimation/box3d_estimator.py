@@ -49,7 +49,8 @@ def _samples_at(depth, rows, columns):
     """Samples in rows and columns (slices)."""
     height, width = depth.shape
     depth_m = depth.part(rows, columns).astype(float) * depth.scale_m
-    valid = (depth_m > 0) & (depth_m <= FARTHEST_M)
+    with np.errstate(invalid='ignore'):  # nan
+        valid = (depth_m > 0) & (depth_m <= FARTHEST_M)
     return Samples(np.arange(width)[columns], np.arange(height)[rows], depth_m, valid)
 
 
