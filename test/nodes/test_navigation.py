@@ -163,7 +163,7 @@ def robot(request):
         driven.advance(0.1, is_driven=False)
         return (driven.costmap.messages and driven.social.messages and driven.tracks.messages
                 and driven.goal.get_num_connections())
-    with running(['roslaunch', os.path.join(ROOT, 'test', 'support', 'navigation.launch'),
+    with running(['roslaunch', os.path.join(ROOT, 'test', 'support', 'social_costmap.launch'),
                   'local_planner:=' + getattr(request, 'param', 'dwa')], env=planner_environment()):
         driven = DrivenRobot()
         driven.social = Recorder('social_costmap/costmap/costmap', OccupancyGrid, publisher_expected=False)

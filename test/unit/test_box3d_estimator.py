@@ -60,6 +60,13 @@ def foreground(depth, rect, *others, camera=CAMERA):
     return estimate_foreground(depth, rects, of(camera), [PERSON_CLASS] * len(rects))[0]
 
 
+def test_depth_may_be_missing_around_raised_arms():
+    depth_mm = np.zeros((48, 64), np.uint16)
+    depth_mm[8:40, 28:36] = 4000
+    box = foreground(DepthImage(depth_mm, 0.001), (26, 8, 38, 40))
+    assert box.center_m[2] == pytest.approx(4.09, abs=0.02)
+
+
 @given(st.integers(500, 5000), st.floats(0.4, 1), st.integers(400, 3000))
 def test_foreground_is_the_person_for_any_share_of_background(person_mm, share, behind_mm):
     """A plate before a wall that fills up to two thirds of the box: the median would be the wall."""

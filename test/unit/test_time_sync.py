@@ -147,6 +147,16 @@ def test_boxes_from_before_a_time_jump_are_dropped(recorder):
     assert recorder.add('depth', 2 * PERIOD, 9 * NS, 'two') == [] and recorder.dropped == ['boxes']
 
 
+def test_boxes_that_arrive_first_after_a_time_jump_wait_for_their_depth_image(recorder):
+    recorder.add('camera', None, 0, 'camera')
+    recorder.add('depth', 3600 * NS, 0, 'end')
+    recorder.add('boxes', 3600 * NS, 0, 'end')
+    recorder.add('boxes', 3600 * NS + PERIOD, 0, 'old')
+    assert recorder.add('boxes', PERIOD, 1, 'boxes') == []
+    assert recorder.add('depth', PERIOD, 2, 'start') == [('boxes', 'start', 'camera')]
+    assert recorder.dropped == ['old']
+
+
 def test_the_number_of_waiting_boxes_is_bounded(recorder):
     settled = [pair for n in range(150) for pair in recorder.add('boxes', PERIOD + n, 0, n)]
     assert settled == [(n, None, None) for n in range(50)]

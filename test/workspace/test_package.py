@@ -55,6 +55,12 @@ def imported(paths):
     return names - STANDARD_LIBRARY - {'ros_3d_bb', 'ros_3d_bb_annotator', 'ros_3d_bb_lab'}
 
 
+def test_roslaunch_finds_each_launch_file_by_its_name():
+    """It refuses a name that two files have, wherever in the package they are."""
+    names = [os.path.basename(path) for path in glob.glob(inside('**', '*.launch'), recursive=True)]
+    assert len(names) > 20 and len(set(names)) == len(names)
+
+
 def test_every_import_is_declared_and_every_dependency_is_used():
     needed = set(KEYS.get(name, name) for name in imported(python_files())) - {None}
     for path in glob.glob(inside('launch', '*')):

@@ -229,3 +229,14 @@ def goals_sent(distance_m, seconds):
 def test_only_a_goal_that_is_not_reached_is_sent_again():
     assert goals_sent(6.0, 3 * RESENT_S + 1) == 4
     assert goals_sent(2.0, 3 * RESENT_S + 1) == 1
+
+
+def test_a_follow_node_that_is_not_enabled_is_working_when_it_receives_tracks():
+    with masterless() as connections:
+        node, status_pub = FollowNode(), connections.publishers['/diagnostics']
+        pose = ('map', 'base_link', np.eye(4))
+        connections.send('/tf', TFMessage(transform_messages(connections.now, [pose])))
+        for message in ('no input yet', 'working'):
+            node._diagnostics._report()
+            assert [status.message for status in status_pub.newest.status] == [message]
+            connections.send(TRACKS_TOPIC, tracks_to_msg([], Header(stamp=connections.now, frame_id='map')))

@@ -88,10 +88,12 @@ def undistort(model, coefficients, images):
     for _step in range(STEPS if hasattr(cv2, 'undistortPointsIter') else STEPS_BEFORE_3_3_1):
         rays = _solved_by_opencv(model, np.array(coefficients), targets.reshape(-1, 1, 2)).reshape(images.shape)
         errors = images - distort(model, coefficients, rays)
-        if not np.any(np.abs(errors) > EXACT):
-            break
+        with np.errstate(invalid='ignore'):  # nan
+            if not np.any(np.abs(errors) > EXACT):
+                break
         targets = targets + errors
-    return np.where(np.abs(errors).max(axis=-1, keepdims=True) <= FOUND, rays, np.nan)
+    with np.errstate(invalid='ignore'):
+        return np.where(np.abs(errors).max(axis=-1, keepdims=True) <= FOUND, rays, np.nan)
 
 
 def _distort_brown(rays, coefficients, is_inverse):

@@ -62,7 +62,8 @@ def _black_ends(lines):
     """Number of lines without depth at both ends of an array (lines, pixels); 0 if there are more than the widest."""
     widest = int(WIDEST_BORDER * len(lines))
     first, last = lines[:widest + 1], lines[:-widest - 2:-1]
-    return int((first > 0).any(axis=1).argmax()), int((last > 0).any(axis=1).argmax())
+    with np.errstate(invalid='ignore'):  # nan
+        return int((first > 0).any(axis=1).argmax()), int((last > 0).any(axis=1).argmax())
 
 
 class RgbdFrame(NamedTuple):

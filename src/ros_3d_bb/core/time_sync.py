@@ -127,6 +127,7 @@ class StampSynchronizer(object):
         self._plain_camera = None  # camera_info without a stamp; None if the newest one has a stamp
         self._waiting = []
         self._end_before_ns = 0  # the last stamp before time jumped back
+        self._newest_boxes_ns, self._boxes_went_back = 0, False  # whether depth images of the new time are awaited
 
     @property
     def newest_ns(self):
@@ -152,7 +153,7 @@ class StampSynchronizer(object):
         newest_ns = self._depths.newest_ns
         if self._depths.add(stamp_ns, now_ns, depth):
             self._end_before_ns = newest_ns
-            self.end(before_jump=True)
+            self._end_before_jump(stamp_ns)
         self._match_waiting(now_ns)
 
     def add_camera(self, stamp_ns, now_ns, camera):
@@ -178,25 +179,36 @@ class StampSynchronizer(object):
             self._on_lost(entry, True)  # boxes from before the time jump
             self._match_waiting(now_ns)
         else:
+            self._boxes_went_back = self._boxes_went_back or stamp_ns < self._newest_boxes_ns - self._length_ns
+            self._newest_boxes_ns = stamp_ns
             self._waiting.append(entry)
             self._match_waiting(now_ns)
 
-    def end(self, before_jump=False):
-        """Give up all waiting boxes, at the end of the input or before a time jump."""
+    def end(self):
+        """Give up all waiting boxes, at the end of the input."""
         lost, self._waiting = self._waiting, []
         for entry in lost:
-            self._on_lost(entry, before_jump)
+            self._on_lost(entry, False)
+
+    def _end_before_jump(self, start_ns):
+        """Give up the boxes from before a time jump to `start_ns`. Those of the new time may have arrived first."""
+        waiting, self._waiting = self._waiting, []
+        for entry in waiting:
+            if self._boxes_went_back and entry.stamp_ns <= start_ns + self._length_ns:
+                self._waiting.append(entry)
+            else:
+                self._on_lost(entry, True)
+        self._boxes_went_back = False
 
     def _match_waiting(self, now_ns):
         """Call the callbacks for boxes whose frame is complete, is lost, or did not arrive in time."""
         if not self._waiting:
             return
-        settled, waiting, newest_ns = [], [], self._depths.newest_ns
+        settled, waiting = [], []
         for number, entry in enumerate(self._waiting):
             depth = self._depths.matching(entry.stamp_ns, self._tolerance_ns)
             camera = None if depth is None else self._camera_at(entry.stamp_ns)
-            is_lost = depth is None and newest_ns is not None and entry.stamp_ns < newest_ns and (
-                self._tolerance_ns > 0 or len(self._depths) > 1)  # else the tolerance is unknown
+            is_lost = depth is None and self._is_past(entry.stamp_ns)
             is_late = now_ns - entry.arrival_ns > self._length_ns
             is_crowded = len(self._waiting) - number > MAX_WAITING
             if camera is not None or is_lost or is_late or is_crowded:
@@ -209,6 +221,15 @@ class StampSynchronizer(object):
                 self._on_lost(boxes, False)
             else:
                 self._on_frame(boxes, depth, camera)
+
+    def _is_past(self, stamp_ns):
+        """Whether no depth image can arrive any more for boxes with this stamp."""
+        newest_ns = self._depths.newest_ns
+        if newest_ns is None or stamp_ns >= newest_ns:
+            return False
+        if self._boxes_went_back and stamp_ns < newest_ns - self._length_ns:
+            return False
+        return self._tolerance_ns > 0 or len(self._depths) > 1  # else the tolerance is unknown
 
     def _camera_at(self, stamp_ns):
         """The camera of the boxes, or the nearest one as soon as no own one is expected any more."""

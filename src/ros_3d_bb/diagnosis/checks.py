@@ -26,9 +26,9 @@ ROLES = {
     BOXES2D: Role('2D boxes', BOXES_TOPIC, 'std_msgs/Int32MultiArray', 'bb_topic',
                   'a detector (pipeline.launch detector:=yolov5 or depth)', DETECTOR_SILENT),
     BOXES3D: Role('3D boxes', BOXES3D_TOPIC, 'ros_3d_bb/BoundingBox3DArray', '', 'bbox3d_node (pipeline.launch)',
-                  'see the log of bbox3d_node'),
+                  'see its log'),
     TRACKS: Role('tracks', TRACKS_TOPIC, 'ros_3d_bb/TrackedObjectArray', '', 'tracker_node (pipeline.launch)',
-                 'see the log of tracker_node')}
+                 'see its log')}
 
 
 def role_named(name, kind):

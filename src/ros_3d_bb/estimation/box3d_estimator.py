@@ -51,7 +51,8 @@ def sample_depth(depth, rect_px, grid):
     height, width = depth.shape
     rows, columns = grid(tuple(map(int, rect_px)), (height, width))
     depth_m = depth.part(rows, columns).astype(float) * depth.scale_m
-    valid = (depth_m > 0) & (depth_m <= FARTHEST_M)
+    with np.errstate(invalid='ignore'):  # nan
+        valid = (depth_m > 0) & (depth_m <= FARTHEST_M)
     return Samples(np.arange(width)[columns], np.arange(height)[rows], depth_m, valid)
 
 

@@ -207,7 +207,7 @@ class RectSamples(object):
             return 0
         with np.errstate(divide='ignore', invalid='ignore'):  # without depth
             across_m = self._along(0) * (layer_m / ahead_m)
-        is_above_trunk = (np.abs(across_m - middle_m) <= HEAD_HALF_WIDTH_M) & (self._ahead_mm < UNKNOWN_MM)
+            is_above_trunk = (np.abs(across_m - middle_m) <= HEAD_HALF_WIDTH_M) & (self._ahead_mm < UNKNOWN_MM)
         counts, body = (np.count_nonzero(each.reshape(self.shape), axis=1)
                         for each in (is_above_trunk, is_above_trunk & on_body))
         is_head = body > LEAST_HEAD * counts.max()

@@ -16,8 +16,9 @@ def blind_corners(ranges_m, limits_m, first_angle, step):
     """
     least_m, largest_m = limits_m
     limited_m = np.minimum(ranges_m, largest_m)
-    points_m = scan_points(limited_m, first_angle, step)[limited_m >= least_m]
-    limited_m = limited_m[limited_m >= least_m]
+    with np.errstate(invalid='ignore'):  # nan
+        is_valid = limited_m >= least_m
+    points_m, limited_m = scan_points(limited_m, first_angle, step)[is_valid], limited_m[is_valid]
     count = len(limited_m)
     if abs(step) * (len(ranges_m) + 1) > 2 * np.pi:  # a full circle is taken twice: obstacles across its ends are whole
         points_m, limited_m = np.tile(points_m, (2, 1)), np.tile(limited_m, 2)

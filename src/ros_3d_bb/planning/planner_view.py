@@ -25,8 +25,10 @@ def usable_tracks(tracks):
 def _fault_of(track):
     """Fault of a track: a value is not finite or implausibly large, or a size or step is not positive; '' if valid."""
     values = np.concatenate([track.position_m, track.velocity_mps, track.size_m, track.prediction_m.ravel()])
-    if not ((np.abs(values) < MAX_COORDINATE_M).all()
-            and ((0 < track.size_m) & (track.size_m < MAX_SIZE_M)).all()):
+    with np.errstate(invalid='ignore'):  # nan
+        is_plausible = ((np.abs(values) < MAX_COORDINATE_M).all()
+                        and ((0 < track.size_m) & (track.size_m < MAX_SIZE_M)).all())
+    if not is_plausible:
         return ('track %d has position %s, velocity %s, size %s and prediction %s; finite numbers and a size of more '
                 'than 0 and less than %g m expected' % (track.id, track.position_m, track.velocity_mps, track.size_m,
                                                         track.prediction_m.tolist(), MAX_SIZE_M))
@@ -51,7 +53,9 @@ def with_usable_covariances(tracks):
 def _is_usable(track):
     blocks_m2 = np.concatenate((track.covariance[:3, :3][np.newaxis], track.covariance[3:, 3:][np.newaxis],
                                 track.prediction_covariance_m2))
-    if not (np.abs(blocks_m2) < MAX_COORDINATE_M).all():
+    with np.errstate(invalid='ignore'):  # nan
+        is_plausible = (np.abs(blocks_m2) < MAX_COORDINATE_M).all()
+    if not is_plausible:
         return False
     variances_m2 = np.linalg.eigvalsh(blocks_m2)
     return bool((variances_m2[:, 0] >= -ROUNDING * np.maximum(variances_m2[:, 2], 1)).all())

@@ -79,17 +79,17 @@ class Diagnostics(EventCounter):
     def _report(self):
         """Publish the status of the node."""
         is_recent = time.monotonic() - self._warned_at < WARNING_LASTS_S
-        faults = self._current_faults()
+        faults, totals = self._current_faults(), self.totals()
         self._log_missing_subscribers()
         if is_recent:
             level, sentence = DiagnosticStatus.WARN, self._warning
         elif faults:
             level, sentence = DiagnosticStatus.WARN, faults[0]
-        elif not self.counts:
+        elif not totals:
             level, sentence = DiagnosticStatus.STALE, 'no input yet'
         else:
             level, sentence = DiagnosticStatus.OK, 'working'
-        entries = [KeyValue(name, str(amount)) for name, amount in self.totals().items()]
+        entries = [KeyValue(name, str(amount)) for name, amount in totals.items()]
         for values in [self._rate_and_latency] + self._shown:
             entries += [KeyValue(name, text) for name, text in values()]
         status = DiagnosticStatus(level, self._status_name, sentence, 'none', entries)
