@@ -4,7 +4,7 @@ import pytest
 from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.estimation.box3d import LEVEL, Box3D
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
-from ros_3d_bb.pipeline.estimation_stage import LATEST, ScaleCheck
+from ros_3d_bb.pipeline.estimation_stage import LATEST_PEOPLE, ScaleCheck
 from ros_3d_bb.sessions.session_reader import read_depth, read_session
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
@@ -22,20 +22,20 @@ def box_of(height_m, rect_px=STANDING_PX, support=0.8, cut_bottom=False):
     (0.9, None), (1.15, None), (1.7, None), (2.3, None)])
 def test_an_impossible_height_gives_the_factor(height_m, factor):
     check = ScaleCheck()
-    factors = [check.factor([box_of(height_m)]) for _ in range(2 * LATEST)]
-    assert factors == 2 * ((LATEST - 1) * [None] + [factor])
+    factors = [check.factor([box_of(height_m)]) for _ in range(2 * LATEST_PEOPLE)]
+    assert factors == 2 * ((LATEST_PEOPLE - 1) * [None] + [factor])
 
 
 @pytest.mark.parametrize('box', [box_of(0.6, SEATED_PX), box_of(0.6, support=0.2), box_of(5.0, cut_bottom=True)])
 def test_seated_doubtful_and_truncated_people_are_not_counted(box):
     check = ScaleCheck()
-    assert not any(check.factor([box]) for _ in range(2 * LATEST))
+    assert not any(check.factor([box]) for _ in range(2 * LATEST_PEOPLE))
 
 
 def test_giants_count_with_any_support():
     """Depth that is too large spreads a person over more than a layer."""
     check = ScaleCheck()
-    assert [check.factor([box_of(8.5, support=0.15)]) for _ in range(LATEST)][-1] == 0.2
+    assert [check.factor([box_of(8.5, support=0.15)]) for _ in range(LATEST_PEOPLE)][-1] == 0.2
 
 
 def boxes_of(depth, rects_px, camera, level_from_camera=LEVEL):
@@ -54,7 +54,7 @@ def test_the_scale_of_a_session_is_correct(session_folder):
     (0.6, 0, (1.15, 1.15), 0), (1.0, 0, (1.7, 1.8), 1), (0.3, 0, (1.9, 1.6), 0), (2.0, 30, (1.15, 1.8), 0),
     (2.5, 45, (1.15, 1.15), 0), (2.8, 60, (1.7, 1.15), 0.8)])
 def test_simulated_people(height_m, tilt_deg, people_m, crouch):
-    """Each image counts `LATEST` times. Standing adults before a level camera show a wrong scale."""
+    """Each image counts `LATEST_PEOPLE` times. Standing adults before a level camera show a wrong scale."""
     ahead_m = 3.5 if tilt_deg == 0 else height_m / np.tan(np.radians(tilt_deg)) + 0.3
     people = [{'start': [ahead_m + 0.3 * side, 0.5 * side], 'facing': 3.0 + side, 'height': tall_m, 'crouch': crouch}
               for side, tall_m in zip((-1, 1), people_m)]
@@ -68,7 +68,7 @@ def test_simulated_people(height_m, tilt_deg, people_m, crouch):
     def factor(scale, level_from_camera):
         check = ScaleCheck()
         boxes = boxes_of(DepthImage(frame.depth_mm, 0.001 * scale), rects_px, simulator.camera, level_from_camera)
-        return next(filter(None, (check.factor(boxes) for _ in range(2 * LATEST))), None)
+        return next(filter(None, (check.factor(boxes) for _ in range(2 * LATEST_PEOPLE))), None)
     assert factor(1, LEVEL) is None and factor(1, level) is None
     if tilt_deg == 0 and crouch == 0 and min(people_m) > 1.5:
         assert factor(5, level) == 0.2 and factor(0.2, level) == 5

@@ -152,6 +152,8 @@ class StampSynchronizer(object):
         """Add a depth image; if its stamp goes back, all data from before the time jump is deleted."""
         newest_ns = self._depths.newest_ns
         if self._depths.add(stamp_ns, now_ns, depth):
+            if len(self._cameras) > 1 and self._cameras.newest_ns > stamp_ns + self._length_ns:
+                self._cameras.clear()  # each image has one of its own
             self._end_before_ns = newest_ns
             self._end_before_jump(stamp_ns)
         self._match_waiting(now_ns)

@@ -15,12 +15,12 @@ from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.estimation.error_model import corrected_boxes, error_model_of_param
 
 # Check of the scale of depth images.
-LATEST = 20  # people that must agree
+LATEST_PEOPLE = 20  # people that must agree
 LEAST_SUPPORT = 0.3  # boxes with less are often those of other objects
 LEAST_ASPECT = 2.5  # height / width of the 2D box of a person who stands; less for seated or hidden people
 HEIGHTS_M = (0.8, 2.4)  # plausible: a child below a camera whose tilt of 45 degrees is unknown, and a tall adult
 COMMON_FACTORS = np.array([0.001, 0.01, 0.1, 0.2, 5, 10, 100, 1000])  # 0.2: 5000 units per metre, as in TUM RGB-D
-NEAR = 1.4  # ratio of a factor and a common one that it stands for
+NEAR_FACTOR = 1.4  # ratio of a factor and a common one that it stands for
 # A camera that is fixed to the robot has the same tilt in each image.
 _level_rotation = functools.lru_cache(maxsize=16)(level_rotation)
 
@@ -146,7 +146,7 @@ class ScaleCheck(object):
     """
 
     def __init__(self):
-        self._heights_m = deque(maxlen=LATEST)
+        self._heights_m = deque(maxlen=LATEST_PEOPLE)
 
     def factor(self, boxes):
         """Add the `Box3D`s of one image, plausible or not.
@@ -158,15 +158,15 @@ class ScaleCheck(object):
             None if the heights are possible or too few. After a factor, new people are collected.
         """
         self._heights_m.extend(float(box.size_m[1]) for box in boxes if _shows_standing_person(box))
-        if len(self._heights_m) < LATEST:
+        if len(self._heights_m) < LATEST_PEOPLE:
             return None
-        lower_m, median_m, upper_m = sorted(self._heights_m)[LATEST // 4::LATEST // 4]
+        lower_m, median_m, upper_m = sorted(self._heights_m)[LATEST_PEOPLE // 4::LATEST_PEOPLE // 4]
         if upper_m >= HEIGHTS_M[0] and lower_m <= HEIGHTS_M[1]:
             return None
         self._heights_m.clear()
         factor = PERSON_CLASS.height / median_m
         ratios = np.abs(np.log(COMMON_FACTORS / factor))
-        return float(COMMON_FACTORS[ratios.argmin()] if ratios.min() < np.log(NEAR) else '%.2g' % factor)
+        return float(COMMON_FACTORS[ratios.argmin()] if ratios.min() < np.log(NEAR_FACTOR) else '%.2g' % factor)
 
 
 def _shows_standing_person(box):
