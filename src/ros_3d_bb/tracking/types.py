@@ -73,7 +73,7 @@ def detections_from_boxes(boxes, fixed_from_camera, classes=ObjectClasses()):
         detections.append(Detection(
             position_m, (width_m, width_m, height_m), covariance_m2,
             box.truncated_edges[-turns:] + box.truncated_edges[:-turns], box.support or 1.0,  # 0: unknown
-            box.label, box.score, index))
+            classes.standard_name(box.label), box.score, index))
     return detections
 
 
