@@ -187,11 +187,14 @@ class Track(object):
         self._update_class(measurement.kind, detection.score, rules.kinds)
 
     def _in_place(self, measurement, latest, period_s, outliers):
-        """The measurement, or if it is nearer than this track by the offset of outliers, and boxes at the track were
-        more likely than outliers, the measurement moved to the track; otherwise the track is moved to it.
+        """Resolve a measurement that is nearer than this track by the offset of outliers. Returns the one to use.
 
-        `misplaced` is filtered by the likelihood ratio of the boxes. It counts fully if the box is not as the `latest`
-        one, and otherwise by the time since then: errors of boxes last.
+        If outliers have probably moved this track, it is moved back. Otherwise the box is wrong, and the measurement is
+        moved to the track; always if several cameras have it in view, whose boxes differ where their poses are wrong.
+        Other measurements are returned as they are.
+
+        The log odds `misplaced` add up the log-likelihood ratios of the boxes. One of another kind than the `latest`
+        counts fully, others by the time `period_s` since then, because errors of boxes last.
         """
         is_nearer = measurement.is_nearer
         share = min(period_s / OUTLIER_CORRELATION_S, 1) if is_nearer == latest.is_nearer else 1
@@ -200,7 +203,8 @@ class Track(object):
                                  LEAST_MISPLACED)
             return measurement
         self.misplaced += share * (outliers.log_inliers - outliers.log_nearer)
-        if self.misplaced < 0 or sum(seen != OUT_OF_VIEW for seen in self.visibility.values()) > 1:
+        cameras = sum(seen != OUT_OF_VIEW for seen in self.visibility.values())
+        if self.misplaced < 0 or cameras > 1:
             return kalman_filter.moved_back(measurement, -measurement.ray_x, -measurement.ray_y, outliers)
         self.state = kalman_filter.moved_back(self.state, measurement.ray_x, measurement.ray_y, outliers)
         self.misplaced, self.latest = LEAST_MISPLACED, self.latest._replace(is_nearer=False)
