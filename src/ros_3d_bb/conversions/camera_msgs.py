@@ -12,7 +12,7 @@ from tf2_msgs.msg import TFMessage
 from ros_3d_bb.camera.camera_model import Camera, quaternion_from
 from ros_3d_bb.camera.distortion import PLUMB_BOB
 from ros_3d_bb.camera.images import DepthImage
-from ros_3d_bb.conversions.image_msgs import fill_image, pixels_from
+from ros_3d_bb.conversions.image_msgs import fill_image, is_compressed, pixels_from
 from ros_3d_bb.core.time_sync import NS
 
 TF_TOPIC, STATIC_TOPIC = 'tf', 'tf_static'
@@ -89,7 +89,7 @@ def _names_of(image_topic):
 
 def uncompressed(message):
     """Return an image message as sensor_msgs/Image. Raises ValueError as `image_msgs.pixels_from`."""
-    if not hasattr(message, 'format'):  # not a sensor_msgs/CompressedImage
+    if not is_compressed(message):
         return message
     return fill_image(Image(header=message.header), *pixels_from(message))
 

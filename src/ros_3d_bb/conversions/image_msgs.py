@@ -56,7 +56,7 @@ def pixels_from(message, encodings=tuple(LAYOUTS), content='supported'):
     Raises ValueError as `array_from`, if a compressed image cannot be decoded, or if the encoding is not one of
     `encodings`, those of the expected `content`.
     """
-    if not hasattr(message, 'format'):  # not a sensor_msgs/CompressedImage
+    if not is_compressed(message):
         if message.encoding not in encodings:
             raise ValueError('%s image has encoding %r; expected one of %s'
                              % (content, message.encoding, ', '.join(encodings)))
@@ -69,6 +69,11 @@ def pixels_from(message, encodings=tuple(LAYOUTS), content='supported'):
     if encoding not in encodings:
         raise ValueError('%s has encoding %.20r; a %s image expected' % (name, encoding, content))
     return pixels, encoding
+
+
+def is_compressed(message):
+    """Whether an image message is a sensor_msgs/CompressedImage."""
+    return hasattr(message, 'format')
 
 
 def imgmsg_to_rgb(message):

@@ -212,8 +212,7 @@ def boxes3d_to_msg(boxes, header, camera):
         message = BoundingBox3D(label=box.label, score=score, support=support, truncated=any(box.truncated_edges))
         for flag, is_cut in zip(EDGE_FLAGS, box.truncated_edges):
             message.truncated_edges |= flag if is_cut else 0
-        _set_xyz(message.center.position, box.center_m.tolist())
-        message.center.orientation.w = 1.0
+        _set_position(message.center, box.center_m.tolist())
         _set_xyz(message.size, box.size_m.tolist())
         if box.covariance_m2 is not None:
             message.position_covariance = np.ravel(box.covariance_m2).tolist()
@@ -297,8 +296,7 @@ def _track_to_msg(track):
                                 prediction_step=genpy.Duration.from_sec(track.prediction_step_s))
     _set_xyz(message.size, track.size_m.tolist())
     _set_xyz(message.twist.twist.linear, track.velocity_mps.tolist())
-    _set_xyz(message.pose.pose.position, track.position_m.tolist())
-    message.pose.pose.orientation.w = 1.0
+    _set_position(message.pose.pose, track.position_m.tolist())
     for position_m in track.prediction_m.tolist():
         pose = PoseWithCovariance()
         point, pose.pose.orientation.w = pose.pose.position, 1.0
@@ -346,6 +344,12 @@ def _track_from_msg(track):
 
 def _covariance_3x3(with_covariance):
     return np.reshape(with_covariance.covariance, (6, 6))[:3, :3]
+
+
+def _set_position(pose, position_m):
+    """Set the position of a geometry_msgs/Pose that is not rotated."""
+    _set_xyz(pose.position, position_m)
+    pose.orientation.w = 1.0
 
 
 def _set_xyz(message, values):
