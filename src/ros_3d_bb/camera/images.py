@@ -112,7 +112,7 @@ class RgbdFrame(NamedTuple):
 
 
 def upright_frame(frame, image_rotation):
-    """Turn a RgbdFrame, as received, upright; `image_rotation` is as for `image_rotation.turns_for`."""
+    """Turn a RgbdFrame, as received, upright; `image_rotation` is as for `turns_for`."""
     turns = turns_for(image_rotation, frame.up)
     if not turns:
         return frame

@@ -14,7 +14,7 @@ from ros_3d_bb.bags.bag_reader import BagError
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, absolute
 from ros_3d_bb.diagnosis.checks import findings
 from ros_3d_bb.diagnosis.message_observer import observe_bag
-from ros_3d_bb.diagnosis.next_command import next_command
+from ros_3d_bb.diagnosis.next_command import DEFAULT_TARGET, next_command
 from ros_3d_bb.diagnosis.observations import Finding
 from ros_3d_bb.nodes.common.graph_observer import GraphObserver, name_for, tracker_param
 from ros_3d_bb.nodes.common.master import NO_ANSWER, TIMEOUT_S, patient_master
@@ -57,7 +57,7 @@ def bag_findings(arguments):
         wanted = name_for(arguments.camera, topic)
         return absolute(names.get(wanted, wanted))
     try:
-        seen = observe_bag(arguments.bag, name_of, arguments.target_frame or 'map', arguments.depth)
+        seen = observe_bag(arguments.bag, name_of, arguments.target_frame or DEFAULT_TARGET, arguments.depth)
     except BagError as error:
         return [Finding('bag', '', str(error), 'rosbag info %s lists its content' % arguments.bag)], '', ''
     found = findings(seen)

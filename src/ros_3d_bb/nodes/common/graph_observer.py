@@ -113,8 +113,8 @@ def tracker_param(name):
 
 def _param(node, name, kind):
     """Return a parameter of a node, or its default if it is not set, or invalid, which the node itself reports."""
-    value = rospy.get_param(rospy.resolve_name('%s/%s' % (node, name)), None)
     params = kind()
+    value = rospy.get_param(rospy.resolve_name('%s/%s' % (node, name)), getattr(params, name))
     with contextlib.suppress(ValueError):
         params, = params_from({name: value}, kind)
     return getattr(params, name)
