@@ -11,7 +11,7 @@ from ros_3d_bb.detection.depth.ground_plane import Floor, floor_from_transform
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb_lab.evaluation.defaults import scenario_path
-from ros_3d_bb_lab.simulation.scenario import read_scenario
+from ros_3d_bb_lab.simulation.scenario import read_scenario, scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
 
 CAMERA = Camera(640, 480, 600.0, 600.0, 319.5, 239.5)
@@ -170,6 +170,21 @@ def test_a_person_who_crouches_stays_detected():
         x_m, _y_m, z_m = transform_points(np.linalg.inv(map_from_camera), (5.0, -2.2, 0.6))
         column = simulator.camera.cx + simulator.camera.fx * x_m / z_m
         assert any(left < column < right for left, _top, right, _bottom in found.boxes.tolist()), number
+
+
+def test_a_person_whom_someone_passes_stays_detected():
+    simulator = Simulator(scenario_from({'duration': 3.0, 'rate': 10.0, 'seed': 3, 'people': [
+        {'start': [3.6, 0.0], 'facing': 3.1, 'moves': [{'wait': 10.0}]},
+        {'start': [2.4, 1.2], 'moves': [{'wait': 0.5}, {'to': [2.4, -1.2], 'speed': 0.8}]}]}))
+    detector, least_visible = DepthPeople(), 1.0
+    for number in range(10, simulator.frame_count):
+        frame = simulator.frame(number)
+        found = detector.detect(frame.color, DepthImage(frame.depth_mm, 0.001), simulator.camera,
+                                floor_from_transform(np.linalg.inv(frame.poses.map_from_camera)))
+        standing = frame.people[0]
+        least_visible = min(least_visible, standing.visible)
+        assert iou(np.array(standing.box_px, float), found.boxes).max() > 0.3, (number, standing.visible)
+    assert least_visible < 0.35
 
 
 def test_furniture_in_the_place_of_a_person_is_not_detected():

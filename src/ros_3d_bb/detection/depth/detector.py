@@ -12,15 +12,15 @@ from ros_3d_bb.detection.boxes import Detections
 from ros_3d_bb.detection.depth.ground_plane import FittedFloor, check_upright
 from ros_3d_bb.detection.depth.person_classifier import (BEST_HOG, PersonHog, PersonWindow, person_score, pyramid_of,
                                                          shape_features_of)
-from ros_3d_bb.detection.depth.person_clusters import (DepthPeopleParams, find_person_clusters, grid_of, is_standing,
-                                                       quantile_of)
+from ros_3d_bb.detection.depth.person_clusters import (DepthPeopleParams, find_person_clusters, grid_of, is_human,
+                                                       is_standing, quantile_of)
 
 MEAN_HEIGHT_M, MEAN_WIDTH_M = 1.7, 0.5  # assumed for people who are partly outside the image
 SURE_SCORE = 0.95  # no further HOG scores are evaluated from this score on
 MAX_HOG_AGE = 2  # number of further images for which the HOG score of a person is used
 # Hysteresis, as of the thresholds of Canny (1986): a person who was sure in so many images continues with a lower
-# score, as one who crouches, for a number of images, of which one without the person counts as several. Chosen:
-# furniture has lower scores or is seldom sure; 75 images are 5 s of the demo.
+# score, as one who crouches or is partly hidden, for a number of images, of which one without the person, whom nobody
+# hides, counts as several. Chosen: furniture has lower scores or is seldom sure; 75 images are 5 s of the demo.
 LEAST_SURE, CONTINUED_SCORE, MAX_UNSURE, NOT_FOUND = 3, 0.1, 75, 15
 NEARER_M, HIDDEN_SHARE = 0.3, 0.5  # of a person who hides the legs of another one, and of the width of these; chosen
 MIN_DISTANCE_M = 0.35  # between the centres of two people; closer detections are one person
@@ -30,7 +30,7 @@ class DepthDetection(NamedTuple):
     """A detected person: box (x1, y1, x2, y2), score 0..1, and position to the right and ahead of the camera.
 
     The HOG score is that of `hog_age` images ago. The person was sure in `sure` images, most recently `unsure` images
-    ago.
+    ago, with the height `height_m`.
     """
 
     box: Tuple[float, float, float, float]
@@ -40,6 +40,7 @@ class DepthDetection(NamedTuple):
     hog_age: int
     sure: int
     unsure: int
+    height_m: float
 
 
 class DepthPeople(object):
@@ -89,7 +90,8 @@ class DepthPeople(object):
             box = box_of(blob, shape, grid, camera, floor)
             position_m = camera.rays((box[0] + box[2]) / 2.0, camera.cy)[0] * shape.depth_m, shape.depth_m
             last, stands = self._last_at(position_m), is_standing(shape, self._params)
-            if last is None and not stands:
+            may_continue = last is not None and last.sure >= LEAST_SURE and last.unsure < MAX_UNSURE
+            if not stands and not may_continue:
                 continue
             features = shape_features_of(blob.mask, blob.window(grid.ahead_m), shape.thickness_m)
             if person_score(features, BEST_HOG, shape.cut_top) < self._params.min_score:
@@ -100,10 +102,13 @@ class DepthPeople(object):
                 if score >= SURE_SCORE:
                     break
             if score >= self._params.min_score and stands:
-                sure = last.sure + 1 if last else 1
-                people.append(DepthDetection(box, score, position_m, hog, hog_age, sure, 0))
-            elif last and last.sure >= LEAST_SURE and last.unsure < MAX_UNSURE and score >= CONTINUED_SCORE:
-                people.append(DepthDetection(box, score, position_m, hog, hog_age, last.sure, last.unsure + 1))
+                sure, height_m = last.sure + 1 if last else 1, MEAN_HEIGHT_M if shape.cut_top else shape.top_m
+                people.append(DepthDetection(box, score, position_m, hog, hog_age, sure, 0, height_m))
+            elif may_continue and score >= CONTINUED_SCORE:
+                if not is_human(shape):
+                    box, position_m = _completed_part(box, shape.depth_m, last, camera, floor)
+                people.append(last._replace(box=box, score=score, position_m=position_m, hog=hog, hog_age=hog_age,
+                                            unsure=last.unsure + 1))
         people = _without_repeated(people)
         self._last_people = people + self._lost(people)
         return _merged_detections([_completed(person, people, camera, floor) for person in people])
@@ -115,8 +120,13 @@ class DepthPeople(object):
 
     def _lost(self, people):
         """The people of the last image who are not found again, and may be in the next one."""
-        return [lost._replace(unsure=lost.unsure + NOT_FOUND, hog_age=MAX_HOG_AGE) for lost in self._last_people
-                if lost.unsure + NOT_FOUND < MAX_UNSURE and not _is_beside(lost, people)]
+        lost = []
+        for person in self._last_people:
+            is_hidden = any(_hidden_share(person, other) for other in people)
+            unsure = person.unsure + (1 if is_hidden else NOT_FOUND)
+            if unsure < MAX_UNSURE and not _is_beside(person, people):
+                lost.append(person._replace(unsure=unsure, hog_age=MAX_HOG_AGE))
+        return lost
 
     def _hog_scores(self, pyramid, window, last):
         """Yield HOG scores and their ages: that of the person in the last image, if any, then new ones."""
@@ -152,6 +162,17 @@ def box_of(blob, shape, grid, camera, floor):
     return x1, y1, min(x2, camera.width), min(y2, camera.height)
 
 
+def _completed_part(box, depth_m, last, camera, floor):
+    """Box and position of a person of whom only a part is visible.
+
+    The height is that of the last DepthDetection, and so is the place across the view, from which the part is at most
+    half the usual width away.
+    """
+    left_m, right_m = camera.rays(np.array(box[::2]), camera.cy)[0] * depth_m
+    across_m = min(max(last.position_m[0], right_m - MEAN_WIDTH_M / 2), left_m + MEAN_WIDTH_M / 2)
+    return _extended(box, last.height_m, depth_m, camera, floor), (across_m, depth_m)
+
+
 def _completed(person, people, camera, floor):
     """Return a DepthDetection whose box ends at the floor if another of the people hides the legs.
 
@@ -159,17 +180,28 @@ def _completed(person, people, camera, floor):
     """
     if not any(_hides_legs(other, person) for other in people):
         return person
-    x1, y1, x2, y2 = person.box
-    soles = floor.row(camera, (x1 + x2) / 2.0, person.position_m[1])
-    return person._replace(box=(x1, y1, x2, min(max(y2, soles), camera.height)))
+    return person._replace(box=_extended(person.box, 0, person.position_m[1], camera, floor))
+
+
+def _extended(box, height_m, depth_m, camera, floor):
+    """Extend the box of a part of a person to the floor, and to a height above it."""
+    x1, y1, x2, y2 = box
+    soles = floor.row(camera, (x1 + x2) / 2.0, depth_m)
+    crown = soles - height_m * camera.fy / depth_m
+    return x1, max(min(y1, crown), 0), x2, min(max(y2, soles), camera.height)
 
 
 def _hides_legs(other, person):
     """Whether a nearer person is in front of most of the lower edge of a person's box."""
-    x1, _top, x2, y2 = person.box
-    left, top, right, bottom = other.box
-    in_front = other.position_m[1] < person.position_m[1] - NEARER_M and top < y2 < bottom
-    return in_front and min(x2, right) - max(x1, left) > HIDDEN_SHARE * (x2 - x1)
+    return other.box[1] < person.box[3] < other.box[3] and _hidden_share(person, other) > HIDDEN_SHARE
+
+
+def _hidden_share(person, other):
+    """Share of the width of a person's box that is behind another, nearer person."""
+    if other.position_m[1] >= person.position_m[1] - NEARER_M:
+        return 0.0
+    (x1, x2), (left, right) = person.box[::2], other.box[::2]
+    return max(min(x2, right) - max(x1, left), 0) / (x2 - x1)
 
 
 def _distance_m(one_m, other_m):

@@ -25,6 +25,9 @@ HIP_M = 0.95  # lower peaks do not count: in an image cut above the hips, the le
 # Smallest height of the top and of the visible part of a person who crouches or bends, the latter also where the image
 # ends below the head; chosen.
 LOW_TOP_M, LOW_VISIBLE_M = 0.7, 0.5
+# Smallest width and height, and smallest height of the top, of the visible part of a person whom someone hides; chosen:
+# the place of legs alone is not that of the trunk.
+PART_WIDTH_M, PART_VISIBLE_M, PART_TOP_M = 0.1, 0.25, 1.0
 TWO_LAYERS = 0.7  # between-class share of the variance of two depth layers; 0.64 for noise, 0.75 for a slanted wall
 
 
@@ -110,9 +113,9 @@ def _rays(camera, step):
 
 
 def find_person_clusters(grid, camera, params):
-    """Return (Blob, Shape) of each blob of human size, of people who crouch, too."""
+    """Return (Blob, Shape) of each blob of human size, of people who crouch, too, and of parts of people."""
     clusters = _merge_stacked(_split_blobs(grid, camera, params), grid, camera)
-    return [(blob, shape) for blob, shape in clusters if _is_human(shape, params)]
+    return [(blob, shape) for blob, shape in clusters if is_human(shape) or _is_part(shape)]
 
 
 def _foreground_cells(grid, params):
@@ -149,7 +152,13 @@ def quantile_of(values, share):
     return np.interp(share * (len(values) - 1), np.arange(len(values)), np.sort(values))
 
 
-def _is_human(shape, params):
+def _is_part(shape):
+    return (PART_WIDTH_M <= shape.width_m <= MAX_WIDTH_M and shape.thickness_m <= MAX_THICKNESS_M
+            and shape.top_m - shape.bottom_m >= PART_VISIBLE_M and PART_TOP_M <= shape.top_m <= MAX_TOP_M)
+
+
+def is_human(shape):
+    """Whether a blob has the size of a whole person, who may stand, crouch, or be cut by the image border."""
     cut = 0.6 if shape.cut_side else 1.0
     return (cut * MIN_WIDTH_M <= shape.width_m <= MAX_WIDTH_M
             and shape.thickness_m <= MAX_THICKNESS_M and shape.top_m - shape.bottom_m >= LOW_VISIBLE_M
@@ -158,8 +167,9 @@ def _is_human(shape, params):
 
 
 def is_standing(shape, params):
-    """Whether a blob of human size is as high as a standing person."""
-    return shape.cut_top or shape.top_m >= params.min_top and shape.top_m - shape.bottom_m >= MIN_VISIBLE_M
+    """Whether a blob has the size of a standing person."""
+    is_high = shape.top_m >= params.min_top and shape.top_m - shape.bottom_m >= MIN_VISIBLE_M
+    return is_human(shape) and (shape.cut_top or is_high)
 
 
 def _connected(cells, row=0, column=0):
