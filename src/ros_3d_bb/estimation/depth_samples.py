@@ -6,7 +6,7 @@ position among the sorted distances, nearest first.
 """
 import functools
 import math
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from typing import NamedTuple
 
 import numpy as np
@@ -57,26 +57,20 @@ LOOKS_DOWN, FEET_M = np.sin(np.radians(10)), 0.3
 _ROW_WEIGHTS = [np.where(np.arange(rows) < UPPER_SHARE * rows, 1, LOWER_WEIGHT)[:, np.newaxis]
                 for rows in range(GRID_ROWS + 1)]  # by the number of rows
 _EMPTY_BINS = LAYER_BINS // 2 + 1  # of the histogram before the nearest distance
-_LAYER_MM, _AROUND_MM = BIN_MM * LAYER_BINS, TRUNK_HALF_DEPTH_MM + BODY_HALF_DEPTH_MM
 
 
 class Layer(NamedTuple):
-    """Depth layer of an object: the distance of its trunk, and the first rank on its body and the one after the last.
-
-    `counts[d]` is the number of distances of at most `low_mm + d`; it is known around the layer.
-    """
+    """Depth layer of an object: the distance of its trunk, the first rank on its body and the one after the last, and
+    all distances in order."""
 
     trunk_mm: int
     first: int
     end: int
-    low_mm: int
-    counts: np.ndarray
+    ordered_mm: np.ndarray
 
     def mean_mm(self, first, end):
         """Mean of the distances from the rank `first` to before `end`."""
-        low, high = self.counts.searchsorted((first, end - 1), 'right').tolist()
-        nearer = int(self.counts[low:high].sum()) - first * (high - low)
-        return self.low_mm + high - nearer / (end - first)
+        return int(self.ordered_mm[first:end].sum()) / (end - first)
 
 
 class RectSamples(object):
@@ -289,28 +283,21 @@ def nearest_dominant_layer(distances_mm, weights, outline=()):
     that a layer would surely have if all distances were like those of the outline is subtracted from its own, up to
     1 - `LEAST_INSIDE` of it. Returns None if no distance is known.
     """
-    nearest_mm = int(distances_mm.min()) if distances_mm.size else UNKNOWN_MM
-    if nearest_mm == UNKNOWN_MM:
+    ordered_mm = distances_mm.copy()
+    ordered_mm.sort(kind='mergesort')  # a radix sort from numpy 1.17 on
+    ranked = memoryview(ordered_mm)
+    count = bisect_left(ranked, UNKNOWN_MM)
+    if not count:
         return None
-    start_mm = _start_of_layer(distances_mm, weights, nearest_mm, outline)
-
-    # Counts of distances in millimetres around the layer, instead of sorting. The first and the last count contain all
-    # other distances; those in the first one precede all ranks.
-    low_mm = max(start_mm - _AROUND_MM - 1, -1)
-    size = min(_LAYER_MM + 2 * _AROUND_MM + 1, UNKNOWN_MM - low_mm)
-    around = np.minimum(distances_mm - np.uint16(low_mm % 2 ** 16), np.uint16(size))
-    counts = np.bincount(around, minlength=size + 1).cumsum()
-    ranks = memoryview(counts)
-    start = start_mm - low_mm
-    trunk = _median(ranks, start, start + _LAYER_MM)
-    trunk = _median(ranks, trunk - TRUNK_HALF_DEPTH_MM, trunk + TRUNK_HALF_DEPTH_MM + 1)
-    first, end = ranks[max(trunk - BODY_HALF_DEPTH_MM - 1, 0)], ranks[trunk + BODY_HALF_DEPTH_MM]
-    return Layer(low_mm + trunk, first, end, low_mm, counts)
+    start_mm = _start_of_layer(distances_mm, weights, ranked[0], ranked[count - 1], outline)
+    trunk_mm = _median(ranked, start_mm, start_mm + BIN_MM * LAYER_BINS - 1)
+    trunk_mm = _median(ranked, trunk_mm - TRUNK_HALF_DEPTH_MM, trunk_mm + TRUNK_HALF_DEPTH_MM)
+    first, end = _ranks(ranked, trunk_mm - BODY_HALF_DEPTH_MM, trunk_mm + BODY_HALF_DEPTH_MM)
+    return Layer(trunk_mm, first, end, ordered_mm)
 
 
-def _start_of_layer(distances_mm, weights, nearest_mm, outline):
+def _start_of_layer(distances_mm, weights, nearest_mm, farthest_mm, outline):
     """Least distance in the nearest dominant layer; it may be less than 0."""
-    farthest_mm = int((distances_mm + np.uint16(1)).max()) - 1
     bins = (farthest_mm - nearest_mm) // BIN_MM + 1 + LAYER_BINS
     # Differences are modulo 2 ** 16: unknown distances are in the first bins, or after the last one.
     numbers = (distances_mm - np.uint16((nearest_mm - BIN_MM * _EMPTY_BINS) % 2 ** 16)) // np.uint16(BIN_MM)
@@ -335,10 +322,15 @@ def _layer_sums(numbers, weights, bins):
     return sums[LAYER_BINS:] - sums[:-LAYER_BINS], sums[-1]
 
 
-def _median(ranks, low, high):
-    """Median, rounded down, of the integers in low..high; `ranks[d]` is the number of those that are at most d."""
-    middle = ranks[max(low - 1, 0)] + ranks[high - 1]
-    return (bisect_right(ranks, (middle - 1) // 2) + bisect_right(ranks, middle // 2)) // 2
+def _ranks(ranked, nearest, farthest):
+    """Rank of the first of the integers in order that is in nearest..farthest, and of the one after the last."""
+    return bisect_left(ranked, nearest), bisect_right(ranked, farthest)
+
+
+def _median(ranked, nearest, farthest):
+    """Median, rounded down, of those of the integers in order that are in nearest..farthest."""
+    middle = sum(_ranks(ranked, nearest, farthest))
+    return (ranked[(middle - 1) // 2] + ranked[middle // 2]) // 2
 
 
 def middle_of_trunk(positions, middle_m):
