@@ -76,18 +76,15 @@ class Layer(NamedTuple):
 class RectSamples(object):
     """Samples of the visible part of a rectangle in the level frame, each an element of flat arrays.
 
-    `rays` are the `camera_rays`; `surrounded` states whether the left, the upper and the right edge show what surrounds
+    `rays` are the `level_rays`; `surrounded` states whether the left, the upper and the right edge show what surrounds
     the object, and `least_m` is the least height of an object that reaches the upper part of the rectangle if no nearer
     one hides it (0: unknown). `shape` are the numbers of rows and columns, and `measured` is the number of samples with
     depth and a viewing ray, masked or not.
     """
 
-    def __init__(self, depth, rect_px, rays, level_axes, surrounded, least_m=0.0):
-        self.rect_px, self._level_axes, self._least_m = rect_px, level_axes, least_m
+    def __init__(self, depth, rect_px, rays, surrounded, least_m=0.0):
+        self.rect_px, self._rays, self._least_m = rect_px, rays, least_m
         self._rows, self._columns = grid_in(rect_px, depth.shape)
-        x, y = rays
-        x = x[:, self._columns] if len(x) == 1 else x[self._rows, self._columns]
-        self._rays = x, y[self._rows] if y.shape[1] == 1 else y[self._rows, self._columns]
         self._depth_m = _depths(depth.part(self._rows, self._columns), depth.scale_m)
         self.shape = self._depth_m.shape
         ahead_m = self._along(2)
@@ -95,14 +92,18 @@ class RectSamples(object):
         self.measured = int(np.count_nonzero(known))
         self._ahead_mm = (1000 * ahead_m + np.float32(0.5)).astype(np.uint16)
         self._ahead_mm[~known] = UNKNOWN_MM
-        self._weights = (_ROW_WEIGHTS[self.shape[0]] * _column_weights(rect_px, self._columns)).ravel()
+        left, _top, right, _bottom = rect_px
+        self._weights = (_ROW_WEIGHTS[self.shape[0]] * _column_weights(self._columns.start - left, right - left,
+                                                                       self._columns.step, self.shape[1])).ravel()
         self._outline = _outline(self.shape, surrounded)
         self._layer = self._layer_in(self._ahead_mm)
 
     def _along(self, axis):
         """Positions along an axis of the level frame, metres."""
-        (x, y), (to_x, to_y, to_z) = self._rays, self._level_axes[axis]
-        return ((to_x * x + (to_y * y + to_z)) * self._depth_m).ravel()
+        across, down = self._rays[axis]
+        if down is None:  # the lens distorts
+            return (across[self._rows, self._columns] * self._depth_m).ravel()
+        return ((across[:, self._columns] + down[self._rows]) * self._depth_m).ravel()
 
     def _layer_in(self, ahead_mm):
         layer = nearest_dominant_layer(ahead_mm, self._weights, self._outline)
@@ -219,10 +220,19 @@ class RectSamples(object):
 
 
 @functools.lru_cache(maxsize=8)
-def camera_rays(camera):
+def _camera_rays(camera):
     """Viewing rays x / z and y / z of all pixels: (1, w) and (h, 1), or both (h, w) if the lens distorts."""
     x, y = camera.rays(np.arange(camera.width)[np.newaxis], np.arange(camera.height)[:, np.newaxis])
     return x.astype(np.float32), y.astype(np.float32)
+
+
+@functools.lru_cache(maxsize=2)
+def level_rays(camera, level_axes):
+    """The viewing rays of all pixels along each axis of the level frame, where z is 1 in the optical frame: pairs of
+    arrays, (1, w) and (h, 1), whose sum they are; (h, w) and None if the lens distorts."""
+    x, y = _camera_rays(camera)
+    pairs = [(to_x * x, to_y * y + to_z) for to_x, to_y, to_z in level_axes]
+    return [(across + down, None) for across, down in pairs] if camera.distortion_model else pairs
 
 
 def grid_in(rect_px, shape):
@@ -255,10 +265,11 @@ def _depths(values, scale_m):
     return depth_m
 
 
-def _column_weights(rect_px, columns):
-    """Weights (w,) of columns (slice): a Gaussian about the middle of a rectangle."""
-    left, _top, right, _bottom = rect_px
-    across = (np.arange(columns.start, columns.stop, columns.step) - (left + right) / 2.0) / ((right - left) / 4.0)
+@functools.lru_cache(maxsize=512)
+def _column_weights(first, width, step, count):
+    """Weights (count,) of every `step`-th column from the `first` one of a rectangle of a `width` on: a Gaussian about
+    its middle."""
+    across = (first + step * np.arange(count) - width / 2.0) / (width / 4.0)
     return np.exp(-0.5 * across ** 2)
 
 
