@@ -306,8 +306,8 @@ def nearest_dominant_layer(distances_mm, weights, outline=()):
     start_mm = _start_of_layer(distances_mm, weights, ranked[0], ranked[count - 1], outline)
     trunk_mm = _median(ranked, start_mm, start_mm + BIN_MM * LAYER_BINS - 1)
     trunk_mm = _median(ranked, trunk_mm - TRUNK_HALF_DEPTH_MM, trunk_mm + TRUNK_HALF_DEPTH_MM)
-    first, end = _ranks(ranked, trunk_mm - BODY_HALF_DEPTH_MM, trunk_mm + BODY_HALF_DEPTH_MM)
-    return Layer(trunk_mm, first, end, ordered_mm)
+    first = bisect_left(ranked, trunk_mm - BODY_HALF_DEPTH_MM)
+    return Layer(trunk_mm, first, bisect_right(ranked, trunk_mm + BODY_HALF_DEPTH_MM), ordered_mm)
 
 
 def _start_of_layer(distances_mm, weights, nearest_mm, farthest_mm, outline):
@@ -335,14 +335,9 @@ def _layer_sums(numbers, weights, bins):
     return sums[LAYER_BINS:] - sums[:-LAYER_BINS], sums[-1]
 
 
-def _ranks(ranked, nearest, farthest):
-    """Rank of the first of the integers in order that is in nearest..farthest, and of the one after the last."""
-    return bisect_left(ranked, nearest), bisect_right(ranked, farthest)
-
-
 def _median(ranked, nearest, farthest):
     """Median, rounded down, of those of the integers in order that are in nearest..farthest."""
-    middle = sum(_ranks(ranked, nearest, farthest))
+    middle = bisect_left(ranked, nearest) + bisect_right(ranked, farthest)
     return (ranked[(middle - 1) // 2] + ranked[middle // 2]) // 2
 
 
