@@ -53,8 +53,9 @@ class DepthImage(NamedTuple):
         if self.area_px is not None:
             return self.area_px
         height, width = self.values.shape
-        left, right = _black_ends(self.values[::BORDER_STEP].T)
-        top, bottom = _black_ends(self.values[:, ::BORDER_STEP])
+        with np.errstate(invalid='ignore'):  # nan
+            left, right = _black_ends(self.values[::BORDER_STEP].T)
+            top, bottom = _black_ends(self.values[:, ::BORDER_STEP])
         return left, top, width - right, height - bottom
 
 
@@ -62,8 +63,7 @@ def _black_ends(lines):
     """Number of lines without depth at both ends of an array (lines, pixels); 0 if there are more than the widest."""
     widest = int(WIDEST_BORDER * len(lines))
     first, last = lines[:widest + 1], lines[:-widest - 2:-1]
-    with np.errstate(invalid='ignore'):  # nan
-        return int((first > 0).any(axis=1).argmax()), int((last > 0).any(axis=1).argmax())
+    return int((first > 0).any(axis=1).argmax()), int((last > 0).any(axis=1).argmax())
 
 
 class RgbdFrame(NamedTuple):

@@ -12,7 +12,7 @@ from ros_3d_bb.camera.images import FARTHEST_M
 from ros_3d_bb.core.object_classes import PERSON, ObjectClasses
 from ros_3d_bb.estimation.box3d import LEVEL, Box3D, ImageGeometry, truncated_edges, without_distortion
 from ros_3d_bb.estimation.depth_samples import (BESIDE_TRUNK_M, BODY_HALF_DEPTH_MM, FEET_M, LEAST_SIZE, LOOKS_DOWN,
-                                                RectSamples, camera_rays, grid_in)
+                                                RectSamples, grid_in, level_rays)
 from ros_3d_bb.estimation.median import centred_grid, estimate_median
 from ros_3d_bb.estimation.overlaps import Overlaps
 
@@ -158,13 +158,13 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     """
     rects_px = list(map(tuple, rects_px))
     flat_px = without_distortion(rects_px, geometry.camera)
-    rays = camera_rays(geometry.camera)
+    rays = level_rays(geometry.camera, geometry.level_axes)
     samples, truncated, usable, boxes = [], [], [], [None] * len(rects_px)
     with np.errstate(invalid='ignore'):  # nan: the distortion model has no ray for every pixel
         for number, rect_px in enumerate(rects_px):
             truncated.append(truncated_edges(rect_px, geometry.area_px))
             surrounded, least_m = _expected(kinds[number], truncated[number])
-            samples.append(RectSamples(depth, rect_px, rays, geometry.level_axes, surrounded, least_m))
+            samples.append(RectSamples(depth, rect_px, rays, surrounded, least_m))
             rows, columns = samples[number].shape
             has_depth = samples[number].measured >= max(LEAST_MEASURED * rows * columns, 1)
             if has_depth and math.isfinite(sum(flat_px[number])):

@@ -6,7 +6,7 @@ position among the sorted distances, nearest first.
 """
 import functools
 import math
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from typing import NamedTuple
 
 import numpy as np
@@ -56,44 +56,38 @@ LOOKS_DOWN, FEET_M = np.sin(np.radians(10)), 0.3
 
 _ROW_WEIGHTS = [np.where(np.arange(rows) < UPPER_SHARE * rows, 1, LOWER_WEIGHT)[:, np.newaxis]
                 for rows in range(GRID_ROWS + 1)]  # by the number of rows
+# Number of samples that are surely expected where there are 0, 1, 2, ..., as of a Poisson distribution.
+_SURELY = np.array([max(count - OUTLINE_SIGMAS * math.sqrt(count), 0)
+                    for count in range(2 * GRID_ROWS + GRID_COLUMNS + 1)])
 _EMPTY_BINS = LAYER_BINS // 2 + 1  # of the histogram before the nearest distance
-_LAYER_MM, _AROUND_MM = BIN_MM * LAYER_BINS, TRUNK_HALF_DEPTH_MM + BODY_HALF_DEPTH_MM
 
 
 class Layer(NamedTuple):
-    """Depth layer of an object: the distance of its trunk, and the first rank on its body and the one after the last.
-
-    `counts[d]` is the number of distances of at most `low_mm + d`; it is known around the layer.
-    """
+    """Depth layer of an object: the distance of its trunk, the first rank on its body and the one after the last, and
+    all distances in order."""
 
     trunk_mm: int
     first: int
     end: int
-    low_mm: int
-    counts: np.ndarray
+    ordered_mm: np.ndarray
 
     def mean_mm(self, first, end):
         """Mean of the distances from the rank `first` to before `end`."""
-        low, high = self.counts.searchsorted((first, end - 1), 'right').tolist()
-        nearer = int(self.counts[low:high].sum()) - first * (high - low)
-        return self.low_mm + high - nearer / (end - first)
+        return int(self.ordered_mm[first:end].sum()) / (end - first)
 
 
 class RectSamples(object):
     """Samples of the visible part of a rectangle in the level frame, each an element of flat arrays.
 
-    `rays` are the `camera_rays`; `surrounded` states whether the left, the upper and the right edge show what surrounds
+    `rays` are the `level_rays`; `surrounded` states whether the left, the upper and the right edge show what surrounds
     the object, and `least_m` is the least height of an object that reaches the upper part of the rectangle if no nearer
     one hides it (0: unknown). `shape` are the numbers of rows and columns, and `measured` is the number of samples with
     depth and a viewing ray, masked or not.
     """
 
-    def __init__(self, depth, rect_px, rays, level_axes, surrounded, least_m=0.0):
-        self.rect_px, self._level_axes, self._least_m = rect_px, level_axes, least_m
+    def __init__(self, depth, rect_px, rays, surrounded, least_m=0.0):
+        self.rect_px, self._rays, self._least_m = rect_px, rays, least_m
         self._rows, self._columns = grid_in(rect_px, depth.shape)
-        x, y = rays
-        x = x[:, self._columns] if len(x) == 1 else x[self._rows, self._columns]
-        self._rays = x, y[self._rows] if y.shape[1] == 1 else y[self._rows, self._columns]
         self._depth_m = _depths(depth.part(self._rows, self._columns), depth.scale_m)
         self.shape = self._depth_m.shape
         ahead_m = self._along(2)
@@ -101,14 +95,18 @@ class RectSamples(object):
         self.measured = int(np.count_nonzero(known))
         self._ahead_mm = (1000 * ahead_m + np.float32(0.5)).astype(np.uint16)
         self._ahead_mm[~known] = UNKNOWN_MM
-        self._weights = (_ROW_WEIGHTS[self.shape[0]] * _column_weights(rect_px, self._columns)).ravel()
+        left, _top, right, _bottom = rect_px
+        self._weights = (_ROW_WEIGHTS[self.shape[0]] * _column_weights(self._columns.start - left, right - left,
+                                                                       self._columns.step, self.shape[1])).ravel()
         self._outline = _outline(self.shape, surrounded)
         self._layer = self._layer_in(self._ahead_mm)
 
     def _along(self, axis):
         """Positions along an axis of the level frame, metres."""
-        (x, y), (to_x, to_y, to_z) = self._rays, self._level_axes[axis]
-        return ((to_x * x + (to_y * y + to_z)) * self._depth_m).ravel()
+        across, down = self._rays[axis]
+        if down is None:  # the lens distorts
+            return (across[self._rows, self._columns] * self._depth_m).ravel()
+        return ((across[:, self._columns] + down[self._rows]) * self._depth_m).ravel()
 
     def _layer_in(self, ahead_mm):
         layer = nearest_dominant_layer(ahead_mm, self._weights, self._outline)
@@ -194,9 +192,9 @@ class RectSamples(object):
 
     def ends(self, on_body):
         """Mean distances of the upper and of the lower end of the body whose samples are given, metres."""
-        body_mm = self._ahead_mm.compress(on_body)
+        body_mm = memoryview(self._ahead_mm.compress(on_body))  # for a few numbers, faster than the array
         count = max(len(body_mm) * END_PERCENT // 100, 1)
-        return int(body_mm[:count].sum()) / (1000 * count), int(body_mm[-count:].sum()) / (1000 * count)
+        return sum(body_mm[:count]) / (1000 * count), sum(body_mm[-count:]) / (1000 * count)
 
     def pixels_above_head(self, on_body, middle_m, layer_m):
         """Number of pixels from the upper edge of the rectangle to the head above the middle of the trunk, which raised
@@ -225,10 +223,19 @@ class RectSamples(object):
 
 
 @functools.lru_cache(maxsize=8)
-def camera_rays(camera):
+def _camera_rays(camera):
     """Viewing rays x / z and y / z of all pixels: (1, w) and (h, 1), or both (h, w) if the lens distorts."""
     x, y = camera.rays(np.arange(camera.width)[np.newaxis], np.arange(camera.height)[:, np.newaxis])
     return x.astype(np.float32), y.astype(np.float32)
+
+
+@functools.lru_cache(maxsize=2)
+def level_rays(camera, level_axes):
+    """The viewing rays of all pixels along each axis of the level frame, where z is 1 in the optical frame: pairs of
+    arrays, (1, w) and (h, 1), whose sum they are; (h, w) and None if the lens distorts."""
+    x, y = _camera_rays(camera)
+    pairs = [(to_x * x, to_y * y + to_z) for to_x, to_y, to_z in level_axes]
+    return [(across + down, None) for across, down in pairs] if camera.distortion_model else pairs
 
 
 def grid_in(rect_px, shape):
@@ -261,10 +268,11 @@ def _depths(values, scale_m):
     return depth_m
 
 
-def _column_weights(rect_px, columns):
-    """Weights (w,) of columns (slice): a Gaussian about the middle of a rectangle."""
-    left, _top, right, _bottom = rect_px
-    across = (np.arange(columns.start, columns.stop, columns.step) - (left + right) / 2.0) / ((right - left) / 4.0)
+@functools.lru_cache(maxsize=512)
+def _column_weights(first, width, step, count):
+    """Weights (count,) of every `step`-th column from the `first` one of a rectangle of a `width` on: a Gaussian about
+    its middle."""
+    across = (first + step * np.arange(count) - width / 2.0) / (width / 4.0)
     return np.exp(-0.5 * across ** 2)
 
 
@@ -289,28 +297,21 @@ def nearest_dominant_layer(distances_mm, weights, outline=()):
     that a layer would surely have if all distances were like those of the outline is subtracted from its own, up to
     1 - `LEAST_INSIDE` of it. Returns None if no distance is known.
     """
-    nearest_mm = int(distances_mm.min()) if distances_mm.size else UNKNOWN_MM
-    if nearest_mm == UNKNOWN_MM:
+    ordered_mm = distances_mm.copy()
+    ordered_mm.sort(kind='mergesort')  # a radix sort from numpy 1.17 on
+    ranked = memoryview(ordered_mm)
+    count = bisect_left(ranked, UNKNOWN_MM)
+    if not count:
         return None
-    start_mm = _start_of_layer(distances_mm, weights, nearest_mm, outline)
-
-    # Counts of distances in millimetres around the layer, instead of sorting. The first and the last count contain all
-    # other distances; those in the first one precede all ranks.
-    low_mm = max(start_mm - _AROUND_MM - 1, -1)
-    size = min(_LAYER_MM + 2 * _AROUND_MM + 1, UNKNOWN_MM - low_mm)
-    around = np.minimum(distances_mm - np.uint16(low_mm % 2 ** 16), np.uint16(size))
-    counts = np.bincount(around, minlength=size + 1).cumsum()
-    ranks = memoryview(counts)
-    start = start_mm - low_mm
-    trunk = _median(ranks, start, start + _LAYER_MM)
-    trunk = _median(ranks, trunk - TRUNK_HALF_DEPTH_MM, trunk + TRUNK_HALF_DEPTH_MM + 1)
-    first, end = ranks[max(trunk - BODY_HALF_DEPTH_MM - 1, 0)], ranks[trunk + BODY_HALF_DEPTH_MM]
-    return Layer(low_mm + trunk, first, end, low_mm, counts)
+    start_mm = _start_of_layer(distances_mm, weights, ranked[0], ranked[count - 1], outline)
+    trunk_mm = _median(ranked, start_mm, start_mm + BIN_MM * LAYER_BINS - 1)
+    trunk_mm = _median(ranked, trunk_mm - TRUNK_HALF_DEPTH_MM, trunk_mm + TRUNK_HALF_DEPTH_MM)
+    first = bisect_left(ranked, trunk_mm - BODY_HALF_DEPTH_MM)
+    return Layer(trunk_mm, first, bisect_right(ranked, trunk_mm + BODY_HALF_DEPTH_MM), ordered_mm)
 
 
-def _start_of_layer(distances_mm, weights, nearest_mm, outline):
+def _start_of_layer(distances_mm, weights, nearest_mm, farthest_mm, outline):
     """Least distance in the nearest dominant layer; it may be less than 0."""
-    farthest_mm = int((distances_mm + np.uint16(1)).max()) - 1
     bins = (farthest_mm - nearest_mm) // BIN_MM + 1 + LAYER_BINS
     # Differences are modulo 2 ** 16: unknown distances are in the first bins, or after the last one.
     numbers = (distances_mm - np.uint16((nearest_mm - BIN_MM * _EMPTY_BINS) % 2 ** 16)) // np.uint16(BIN_MM)
@@ -319,8 +320,7 @@ def _start_of_layer(distances_mm, weights, nearest_mm, outline):
     if len(outline) >= LEAST_OUTLINE:
         around, known = _layer_sums(numbers[outline], None, bins)
         if known >= LEAST_OUTLINE:
-            surely = np.maximum(around - OUTLINE_SIGMAS * np.sqrt(around), 0)  # as of a Poisson distribution
-            inside = np.maximum(layers - surely * (total / known), LEAST_INSIDE * layers)
+            inside = np.maximum(layers - _SURELY[around] * (total / known), LEAST_INSIDE * layers)
     first = int((inside >= FIRST_LAYER_SHARE * inside.max()).argmax())
     best = first + int(layers[first:first + LAYER_BINS].argmax())
     return nearest_mm + BIN_MM * (best - LAYER_BINS // 2)
@@ -335,10 +335,10 @@ def _layer_sums(numbers, weights, bins):
     return sums[LAYER_BINS:] - sums[:-LAYER_BINS], sums[-1]
 
 
-def _median(ranks, low, high):
-    """Median, rounded down, of the integers in low..high; `ranks[d]` is the number of those that are at most d."""
-    middle = ranks[max(low - 1, 0)] + ranks[high - 1]
-    return (bisect_right(ranks, (middle - 1) // 2) + bisect_right(ranks, middle // 2)) // 2
+def _median(ranked, nearest, farthest):
+    """Median, rounded down, of those of the integers in order that are in nearest..farthest."""
+    middle = bisect_left(ranked, nearest) + bisect_right(ranked, farthest)
+    return (ranked[(middle - 1) // 2] + ranked[middle // 2]) // 2
 
 
 def middle_of_trunk(positions, middle_m):

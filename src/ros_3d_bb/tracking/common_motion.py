@@ -49,16 +49,9 @@ def camera_motion(previous, image):
     before, after = previous.view.fixed_from_camera, image.view.fixed_from_camera
     if period_s <= 0 or before is after:
         return CameraMotion(previous, period_s)
-    (*was_across, was_x), (*was_along, was_y) = before[:2].tolist()
-    (*across, x), (*along, y) = after[:2].tolist()
-    angle = math.atan2(_dot(along, was_across) - _dot(across, was_along),
-                       _dot(across, was_across) + _dot(along, was_along))
-    x, y = x - was_x, y - was_y
+    (xx, xy), (yx, yy) = after[:2, :3].dot(before[:2, :3].T).tolist()
+    angle, (x, y) = math.atan2(yx - xy, xx + yy), (after[:2, 3] - before[:2, 3]).tolist()
     return CameraMotion(previous, period_s, (x, y, angle), (x / period_s, y / period_s, angle / period_s))
-
-
-def _dot(first, second):
-    return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
 
 
 def pose_jump(camera, known, measurements, view):

@@ -315,7 +315,7 @@ def published(tracks, params):
         return []
     numbers = np.array([_numbers_of(track, params.standing_speed ** 2 + LEAST_SPEED2) for track in tracks])
     numbers[:, POSITION_VARIANCES] += params.position_bias ** 2
-    times_s, powers, spread = _times(params)
+    times_s, powers, spread = _times(params.prediction_time, params.prediction_step)
     densities = params.prediction_acceleration + params.manoeuvre_acceleration * numbers[:, MANOEUVRING]
     positions_m, velocities_mps, sizes_m = numbers[:, POSITION], numbers[:, VELOCITY], numbers[:, SIZE]
     predictions_m = positions_m[:, None] + times_s[:, None] * numbers[:, None, EXPECTED]
@@ -344,9 +344,9 @@ def _numbers_of(track, standing2):
 
 
 @functools.lru_cache(maxsize=16)
-def _times(params):
+def _times(time_s, step_s):
     """Times of the predictions (steps,), their powers 0 to 2 (steps, 3), and the variances (steps, 9) that a white
     acceleration of density 1 adds.
     """
-    times_s = prediction_times_s(params.prediction_time, params.prediction_step)
+    times_s = prediction_times_s(time_s, step_s)
     return (times_s, np.stack((times_s ** 0, times_s, times_s ** 2), axis=1), (times_s ** 3 / 3)[:, None] * LEVEL)
