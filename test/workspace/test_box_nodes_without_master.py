@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray
 
@@ -7,22 +8,29 @@ from fuzz.hostile import good_messages, transforms
 from fuzz.nodes import send_image
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_rgb
-from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, boxes2d_from_msg, time_from
+from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg,
+                                                   time_from)
+from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
+from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.nodes.viewer_node import ViewerNode
 from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
+from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb.visualization.image_overlay import VALID_COLOR
+from ros_3d_bb.visualization.markers import AREA, MARKERS_TOPIC, MarkerParams
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
+from support.launching import loaded
 from support.masterless import masterless
-from support.ros import depth_message
+from support.ros import depth_message, header_at
+from support.two_cameras import boxes
 
 START_NS = 1000 * NS
 
@@ -123,6 +131,29 @@ def test_nothing_is_published_while_no_floor_is_known():
     """Neither from tf nor from a depth image: an empty array would mean that there are no people."""
     message, _drawn, counts, _true_boxes = answer('unknown_to_tf', people=[], robot={'pitch': -0.9})
     assert message is None and counts['images without floor'] == 1
+
+
+def test_no_track_starts_in_ignored_areas_nor_behind_cells_of_the_map():
+    """A person 3 m ahead, one in an area at 5 m, and a poster on a wall at 7 m; the wall ends before y = 2."""
+    grid = OccupancyGrid(header=header_at(0, 'map'), data=[100] * 20)
+    grid.info.width, grid.info.height, grid.info.resolution = 1, 20, 0.1
+    grid.info.origin.position.x, grid.info.origin.position.y, grid.info.origin.orientation.w = 7.0, -1.0, 1.0
+    parameters, nodes = loaded('tracker.launch', 'map:=static_map')
+    assert ('map', 'static_map') in [tuple(remapping) for remapping in nodes['tracker_node'].remap_args]
+    with masterless({'use_map': parameters['/tracker_node/use_map'], 'tf_timeout': 0.0}) as connections:
+        node, areas = TrackerNode(), '[[[4.5, -0.5], [5.5, -0.5], [5.5, 0.5], [4.5, 0.5]]]'
+        node._reconfigure(*params_from({'ignored_areas': areas}, TrackerNodeParams, MarkerParams, *TRACKING_PARAMS))
+        connections.send('map', grid)
+        for number in range(10):
+            stamp_ns = START_NS + number * NS // 10
+            connections.send('/tf', transforms(stamp_ns))
+            centers_m = (1.0, 0.2, 3.0), (0.0, 0.2, 5.0), (0.0, 0.2, 7.2), (-2.0, 0.2, 7.2)
+            connections.send(BOXES3D_TOPIC, boxes(stamp_ns, centers_m=centers_m))
+        message, markers = (connections.publishers[topic].newest for topic in (TRACKS_TOPIC, MARKERS_TOPIC))
+    assert message.header == header_at(stamp_ns, 'map')
+    assert sorted(round(track.pose.pose.position.y) for track in message.objects) == [-1, 2]
+    assert AREA in [marker.ns for marker in markers.markers]
+    assert node._diagnostics.counts['boxes in ignored areas'] >= 20
 
 
 def test_the_tilt_of_the_camera_is_stored_once_it_is_known(tmp_path):
