@@ -18,7 +18,7 @@ from ros_3d_bb.nodes.common.master import patient_master
 from ros_3d_bb.nodes.common.part import Part
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.rgbd_inputs import RgbdInputs
-from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.startup import read_params
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscribe_camera_info
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
 from ros_3d_bb.visualization.image_overlay import depth_to_grey, draw_boxes, draw_samples
@@ -196,7 +196,3 @@ class SampleImages(object):
     def _on_color(self, message):
         with self._diagnostics.rejecting('colour images'):
             self._colors.add(stamp_of(message), 0, message)
-
-
-def main():
-    run_node('bbox3d_node', Bbox3dNode)

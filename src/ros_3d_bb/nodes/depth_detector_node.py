@@ -11,7 +11,7 @@ from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.part import Part
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.rgbd_inputs import RgbdInputs
-from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.startup import read_params
 from ros_3d_bb.nodes.common.subscribers import subscribe
 from ros_3d_bb.pipeline.detection_stage import DepthDetectionStage, DepthDetectorParams
 
@@ -50,7 +50,3 @@ class DepthDetectorNode(object):
             frame = self._inputs.source.frame(*messages)
             detections = self._stage.detect(frame)
         return None if detections is None else (frame.received_color, detections)
-
-
-def main():
-    run_node('depth_detector_node', DepthDetectorNode)

@@ -24,11 +24,9 @@ class RgbdInputs(object):
         between both cameras in tf.
     camera/color/camera_info : sensor_msgs/CameraInfo
         Calibration of the colour camera.
-    /tf : tf2_msgs/TFMessage
+    /tf,/tf_static : tf2_msgs/TFMessage
         Transform from ~floor_frame to the camera, for its tilt and the floor, and between the cameras for raw depth.
         Not used if ~floor_frame is empty and depth is aligned.
-    /tf_static : tf2_msgs/TFMessage
-        As /tf.
     """
 
     def __init__(self, params, diagnostics, on_match, transforms, **of_source):
