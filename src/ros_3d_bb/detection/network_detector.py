@@ -1,4 +1,4 @@
-"""Detector that runs a network: resizing, network, class filter, non-maximum suppression.
+"""Detector that runs a network: resizing, conversion to a batch, network, class filter, non-maximum suppression.
 
 Convention: boxes are (x1, y1, x2, y2) in pixels of the image, x to the right, y down, x2 and y2 exclusive.
 """
@@ -11,6 +11,7 @@ from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.detection.adaptive_size import SIZES
 from ros_3d_bb.detection.boxes import Detections, non_maximum_suppression
 
+RGB, BGR = (0, 1, 2), (2, 1, 0)  # orders of the channels of an RGB image
 RESIZE_MODES = ('center', 'corner', 'stretch')
 MAX_INPUT_PX = 4096  # larger inputs exhaust the memory
 MAX_CANDIDATES = 30000  # maximum number of boxes before suppression, as in ultralytics
@@ -144,6 +145,21 @@ def fit_image(image, input_hw, stride=None, resize=Resize()):
                                    value=(resize.padding,) * 3)
     scale_xy = (scaled_hw[1] / float(width), scaled_hw[0] / float(height)) if resize.mode == 'stretch' else (scale,) * 2
     return image, Placement(scale_xy, (left, top))
+
+
+def batch_of(image, order=RGB, mean=(0.0, 0.0, 0.0), std=(255.0, 255.0, 255.0), dtype=np.float32):
+    """Convert an RGB image (height, width, 3), uint8, to a batch (1, 3, height, width) of (value - mean) / std.
+
+    `order` is that of the channels in the batch, in mean and in std.
+    """
+    batch, channels = np.empty((1, 3) + image.shape[:2], dtype), cv2.split(image)
+    for plane, number, mean_value, std_value in zip(batch[0], order, mean, std):
+        plane[...] = channels[number]
+        if mean_value != 0:
+            plane -= dtype(mean_value)
+        if std_value != 1:
+            plane /= dtype(std_value)
+    return batch
 
 
 def ranked(detections, classes):

@@ -13,8 +13,7 @@ import numpy as np
 
 from ros_3d_bb.core.params import Param, check, parameters
 from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetector
-from ros_3d_bb.detection.onnx.onnx_model import OnnxModel
-from ros_3d_bb.detection.onnx.session import gpus_are_supported
+from ros_3d_bb.detection.onnx.onnx_model import OnnxModel, gpus_are_supported
 from ros_3d_bb.detection.weights import WeightsError
 from ros_3d_bb.detection.yolov5.onnx_backend import OnnxUnusable, export_folder, open_exported
 

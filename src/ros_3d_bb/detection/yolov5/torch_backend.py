@@ -5,7 +5,7 @@ import numpy as np
 import torch
 
 from ros_3d_bb.core.error_text import cause
-from ros_3d_bb.detection.batches import batch_of
+from ros_3d_bb.detection.network_detector import batch_of
 from ros_3d_bb.detection.weights import WeightsError, class_names
 from ros_3d_bb.detection.yolov5.checkpoint import EXPECTED, read_checkpoint
 from ros_3d_bb.detection.yolov5.network import Network
