@@ -1,19 +1,23 @@
+import os
+from unittest import mock
+
 import numpy as np
 import pytest
 from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray
 
-from fuzz.hostile import good_messages, transforms
+from fuzz.hostile import CAMERA, good_messages, transforms
 from fuzz.nodes import send_image
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
-from ros_3d_bb.conversions.image_msgs import imgmsg_to_rgb
+from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg,
-                                                   time_from)
+                                                   boxes3d_to_msg, time_from)
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
+from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
@@ -21,7 +25,7 @@ from ros_3d_bb.nodes.viewer_node import ViewerNode
 from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams
-from ros_3d_bb.sessions.session_reader import read_session
+from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb.visualization.image_overlay import VALID_COLOR
 from ros_3d_bb.visualization.markers import AREA, MARKERS_TOPIC, MarkerParams
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
@@ -154,6 +158,48 @@ def test_no_track_starts_in_ignored_areas_nor_behind_cells_of_the_map():
     assert sorted(round(track.pose.pose.position.y) for track in message.objects) == [-1, 2]
     assert AREA in [marker.ns for marker in markers.markers]
     assert node._diagnostics.counts['boxes in ignored areas'] >= 20
+
+
+@pytest.fixture
+def viewer(tmp_path):
+    """viewer_node, whose session is a folder to be created."""
+    parameters, _nodes = loaded('viewer.launch', 'session:=%s' % (tmp_path / 'a session'), 'window:=false')
+    with masterless({name.rpartition('/')[2]: value for name, value in parameters.items()}) as connections:
+        connections.node, connections.folder = ViewerNode(), parameters['/viewer_node/session']
+        yield connections
+
+
+def test_captures_are_appended_and_an_image_is_stored_once(viewer):
+    viewer.send(COLOR_TOPIC, Image())  # rejected
+    assert not viewer.node.capture()[0] and not os.path.exists(viewer.folder)
+    box = Box3D(np.array([0.5, 0.1, 3.0]), np.array([0.5, 1.7, 0.5]), (26, 8, 38, 44), 0.75, (False,) * 4)
+    for number, label in enumerate('AB'):
+        messages = good_messages(START_NS + number)
+        messages[BOXES3D_TOPIC] = boxes3d_to_msg([box], messages[BOXES3D_TOPIC].header, CAMERA)
+        send_image(viewer, START_NS + number, messages)
+        with mock.patch('ros_3d_bb.nodes.common.label.patient_master') as master:
+            master.return_value.getParam.return_value = label
+            assert viewer.node.capture()[0] and not viewer.node.capture()[0]
+    session = read_session(viewer.folder)
+    assert (session.camera, session.frame_id) == (CAMERA, 'camera')
+    assert [(frame.stamp_ns, frame.label) for frame in session.frames] == [(START_NS, 'A'), (START_NS + 1, 'B')]
+    for frame in session.frames:
+        np.testing.assert_array_equal(read_color(frame, session.camera), imgmsg_to_rgb(messages[COLOR_TOPIC]))
+        np.testing.assert_array_equal(read_depth(frame, session).values, imgmsg_to_depth(messages[DEPTH_TOPIC]).values)
+        assert frame.boxes_px == ((26, 8, 38, 44),)
+        np.testing.assert_allclose([detection.estimate_m for detection in frame.detections], [[0.5, 0.1, 3.0]])
+
+
+def test_images_without_boxes_are_stored_after_a_warning(viewer):
+    for number in range(12):
+        messages = good_messages(START_NS + number * NS // 10)
+        del messages[BOXES_TOPIC], messages[BOXES3D_TOPIC]
+        send_image(viewer, START_NS + number * NS // 10, messages)
+    is_stored, answer = viewer.node.capture()
+    assert not is_stored and 'no 3D boxes received on /ros_3d_bb/bb_3d' in answer
+    assert viewer.node.capture()[0]
+    stored, = read_session(viewer.folder).frames
+    assert stored.stamp_ns == START_NS + 11 * NS // 10 and stored.detections == ()
 
 
 def test_the_tilt_of_the_camera_is_stored_once_it_is_known(tmp_path):
