@@ -62,7 +62,6 @@ def test_boxes_become_3d_in_the_frame_and_at_the_stamp_of_the_image(connections)
 
 def test_boxes_without_a_stamp_get_the_image_that_arrived_before_them(connections, monkeypatch):
     """Of two images 0.4 s apart, the one 0.05 s (~assumed_delay) before."""
-    monkeypatch.setattr('ros_3d_bb.nodes.bbox3d_node.arrival_clock_ns', lambda: connections.now.to_nsec())
     monkeypatch.setattr('ros_3d_bb.nodes.common.rgbd_inputs.arrival_clock_ns', lambda: connections.now.to_nsec())
     for stamp_ns, depth_mm in (START_NS, 1500), (START_NS + 2 * NS // 5, 2000):
         connections.now = time_from(stamp_ns)

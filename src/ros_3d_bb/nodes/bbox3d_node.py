@@ -11,7 +11,7 @@ from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, b
                                                    header_of, stamp_of)
 from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.core.object_classes import described
-from ros_3d_bb.core.time_sync import NS, MessageCache, arrival_clock_ns
+from ros_3d_bb.core.time_sync import NS, MessageCache
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.master import patient_master
@@ -52,6 +52,7 @@ class Bbox3dNode(object):
                                   cache_s=params.cache_length, assumed_delay_s=params.assumed_delay)
         if params.depth != RAW:
             self._diagnostics.check(DepthCameraCheck(with_frames=not params.frame_id).faults)
+        self.on_boxes = self._inputs.receiver('2D boxes', self._inputs.source.add_boxes)
         if part.subscribes:
             subscribe(BOXES_TOPIC, Int32MultiArray, self.on_boxes)
         ReconfigureServer([params], self._reconfigure, part.namespace)
@@ -61,11 +62,6 @@ class Bbox3dNode(object):
             self._stage.reconfigure(params)
             self._inputs.source.set_assumed_delay(params.assumed_delay)
             self._images.depth_range_m = params.depth_image_range
-
-    def on_boxes(self, message):
-        """Process the 2D boxes of an image."""
-        with self._diagnostics.receiving('2D boxes'), self._inputs.lock:
-            self._inputs.source.add_boxes(message, arrival_clock_ns())
 
     def _on_match(self, boxes2d, depth_msg, camera):
         """Publish the 3D boxes of one image, once its 2D boxes, depth image and camera model have arrived."""

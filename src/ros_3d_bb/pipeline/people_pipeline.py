@@ -118,7 +118,7 @@ class PeoplePipeline(object):
         elif topic == DEPTH_INFO_TOPIC:
             if tracking_stage.uses_depth:
                 tracking_stage.add_depth_camera_info(message, camera)
-            source.add_depth_camera_info(message)
+            source.add_depth_camera_info(message, now_ns)
         elif topic == DEPTH_TOPIC:
             message = uncompressed(message)  # once for all stages
             if tracking_stage.uses_depth:

@@ -48,7 +48,7 @@ class RgbdSource(object):
         self._color_frame = message.header.frame_id
         self._sync.add_camera(stamp_if_any(message), now_ns, camera)
 
-    def add_depth_camera_info(self, message):
+    def add_depth_camera_info(self, message, _now_ns):
         """Add a sensor_msgs/CameraInfo of the depth camera, for raw depth."""
         self._registration.add_camera_info(message)
 
