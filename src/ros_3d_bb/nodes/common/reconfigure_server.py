@@ -1,6 +1,5 @@
 """Server for changing the parameters of a running node with the dynamic_reconfigure tools."""
 import threading
-from collections import OrderedDict
 
 import rospy
 from dynamic_reconfigure.encoding import decode_config, encode_config, get_tree
@@ -94,7 +93,7 @@ class ReconfigureServer(object):
 
 def live_in(kinds):
     """Return the live parameters of NamedTuple types, {name: Param}."""
-    return OrderedDict((name, param) for name, param in table_of(kinds).items() if param.live)
+    return {name: param for name, param in table_of(kinds).items() if param.live}
 
 
 def _description_of(live):
