@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from ros_3d_bb.planning.blind_corners import LEAST_WIDTH_M, blind_corners
 from ros_3d_bb.planning.planner_view import position_after
-from ros_3d_bb.planning.safe_speed import (CornerParams, SafeSpeedParams, highest_safe_speed, limited_velocity,
-                                           speed_before_corners)
+from ros_3d_bb.planning.safe_speed import (LEAST_WIDTH_M, CornerParams, SafeSpeedParams, blind_corners,
+                                           highest_safe_speed, limited_velocity, speed_before_corners)
 from ros_3d_bb_lab.simulation.laser import BEAMS, FIELD_OF_VIEW, RANGE_M, scan_ranges
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from support.tracks import track_at

@@ -19,8 +19,8 @@ from ros_3d_bb.nodes.bbox3d_node import SampleImages
 from ros_3d_bb.nodes.common import master, startup, subscribers
 from ros_3d_bb.nodes.common.detector_output import DetectorWorker
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics, unsubscribed_results
+from ros_3d_bb.nodes.common.startup import Part
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
-from ros_3d_bb.nodes.common.part import Part
 from ros_3d_bb.nodes.tracker_node import RESERVED_IDS, TrackIdReservation
 from support.ros import wait_until
 

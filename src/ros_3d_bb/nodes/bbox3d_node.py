@@ -15,10 +15,9 @@ from ros_3d_bb.core.time_sync import NS, MessageCache
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.master import patient_master
-from ros_3d_bb.nodes.common.part import Part
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.rgbd_inputs import RgbdInputs
-from ros_3d_bb.nodes.common.startup import read_params
+from ros_3d_bb.nodes.common.startup import Part, read_params
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscribe_camera_info
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
 from ros_3d_bb.visualization.image_overlay import depth_to_grey, draw_boxes, draw_samples

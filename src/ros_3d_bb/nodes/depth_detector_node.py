@@ -7,10 +7,9 @@ from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.nodes.common.detector_output import DetectorWorker
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
-from ros_3d_bb.nodes.common.part import Part
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.rgbd_inputs import RgbdInputs
-from ros_3d_bb.nodes.common.startup import read_params
+from ros_3d_bb.nodes.common.startup import Part, read_params
 from ros_3d_bb.nodes.common.subscribers import subscribe
 from ros_3d_bb.pipeline.detection_stage import DepthDetectionStage, DepthDetectorParams
 

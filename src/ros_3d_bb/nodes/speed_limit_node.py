@@ -16,9 +16,8 @@ from ros_3d_bb.nodes.common.latest_tracks import RobotTracks
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import read_params
 from ros_3d_bb.nodes.common.subscribers import subscribe
-from ros_3d_bb.planning.blind_corners import blind_corners
-from ros_3d_bb.planning.safe_speed import (CornerParams, SafeSpeedParams, highest_safe_speed, limited_velocity,
-                                           speed_before_corners)
+from ros_3d_bb.planning.safe_speed import (CornerParams, SafeSpeedParams, blind_corners, highest_safe_speed,
+                                           limited_velocity, speed_before_corners)
 
 PERIOD_S = 0.05  # between two limits; chosen: that of move_base's controller, and a tenth of the default timeout
 AHEAD = 0.0, 0.0, 0.0

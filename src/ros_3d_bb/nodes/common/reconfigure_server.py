@@ -22,7 +22,7 @@ class ReconfigureServer(object):
 
     `params` are all parameters of the node, as returned by `startup.read_params`. `apply` is called with the changed
     parameters, in the same order. It raises ValueError without changing anything if they are invalid. `namespace` is
-    that of the node, see `part.Part`.
+    that of the node, see `startup.Part`.
 
     Publishes
     ---------
