@@ -6,22 +6,27 @@ import pytest
 from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray
+from std_srvs.srv import SetBoolRequest
 
 from fuzz.hostile import CAMERA, good_messages, transforms
 from fuzz.nodes import send_image
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
-from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
+from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg,
-                                                   boxes3d_to_msg, time_from)
+                                                   boxes3d_to_msg, stamp_of, time_from)
+from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
+from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
+from ros_3d_bb.nodes.common import detector_output
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.nodes.viewer_node import ViewerNode
+from ros_3d_bb.nodes.yolov5_node import Yolov5Node
 from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams
@@ -33,7 +38,7 @@ from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
 from support.launching import loaded
 from support.masterless import masterless
-from support.ros import depth_message, header_at
+from support.ros import depth_message, header_at, wait_until
 from support.two_cameras import boxes
 
 START_NS = 1000 * NS
@@ -134,6 +139,68 @@ def test_nothing_is_published_while_no_floor_is_known():
     """Neither from tf nor from a depth image: an empty array would mean that there are no people."""
     message, _drawn, counts, _true_boxes = answer('unknown_to_tf', people=[], robot={'pitch': -0.9})
     assert message is None and counts['images without floor'] == 1
+
+
+@pytest.fixture
+def camera(weights):
+    """The connections of the node, whose workers work at once."""
+    parameters, _nodes = loaded('yolov5.launch', 'weights:=' + weights)
+    with masterless({name.rpartition('/')[2]: value for name, value in parameters.items()}) as connections:
+        yield connections
+
+
+@pytest.fixture
+def image(session_folder):
+    """A colour image with a person, and the person's box."""
+    session = read_session(session_folder)
+    return read_color(session.frames[15], session.camera), session.frames[15].boxes_px[0]
+
+
+def newest(camera):
+    message = camera.publishers[BOXES_TOPIC].newest
+    return message and boxes2d_from_msg(message)
+
+
+def sent(camera, image, stamp_ns=START_NS):
+    """The newest boxes after an image."""
+    camera.send(COLOR_TOPIC, fill_image(Image(header=header_at(stamp_ns)), image, 'rgb8'))
+    return newest(camera)
+
+
+@pytest.mark.needs('torch')
+def test_the_person_is_detected_and_drawn_at_the_stamp_of_the_image(camera, image):
+    Yolov5Node()
+    pixels, box = image
+    boxes, drawn = sent(camera, pixels), camera.publishers['yolo_result_out'].newest
+    assert boxes.stamp_ns == START_NS == stamp_of(drawn) and boxes.frame_id == 'camera_color_optical_frame'
+    assert boxes.labels == ('person',) and 0.25 < boxes.scores[0] < 1
+    assert iou(np.array(box, float), boxes.boxes).tolist() > [0.8]
+    lines, columns = np.nonzero((imgmsg_to_rgb(drawn) != pixels).any(axis=2))
+    assert abs(columns.max() - box[2]) < 30 and abs(lines.max() - box[3]) < 30
+
+
+@pytest.mark.needs('torch')
+def test_the_service_pauses_and_changed_parameters_apply_from_the_next_image_on(camera, image):
+    """An empty array means that no people were detected."""
+    node = Yolov5Node()
+    assert 'paused' in node._worker._on_request(SetBoolRequest(False)).message
+    assert sent(camera, image[0]) is None and node._worker._on_request(SetBoolRequest(True)).success
+    for changes, count in (({'confidence': 1.0}, 0), ({}, 1), ({'image_size': 320}, 1), ({'image_size': 0}, 1)):
+        node._set_params(DetectionParams(**changes))
+        assert len(sent(camera, image[0]).boxes) == count
+    with pytest.raises(ValueError, match='unicorn'):
+        node._set_params(DetectionParams(confidence=1.0, classes=['unicorn']))
+    assert len(sent(camera, image[0]).boxes) == 1
+
+
+@pytest.mark.needs('torch')
+def test_the_newest_image_is_processed_and_others_are_skipped(camera, image, monkeypatch):
+    monkeypatch.setattr(detector_output, 'NewestWorker', NewestWorker)
+    node = Yolov5Node()
+    for number in range(60):
+        sent(camera, image[0], START_NS + number)
+    wait_until(lambda: newest(camera) and newest(camera).stamp_ns == START_NS + 59, 'the boxes of the last image')
+    assert camera.publishers[BOXES_TOPIC].count + node._diagnostics.counts['images skipped for a newer one'] == 60
 
 
 def test_no_track_starts_in_ignored_areas_nor_behind_cells_of_the_map():
