@@ -89,18 +89,18 @@ class DepthCameraCheck(object):
     """
 
     def __init__(self, with_frames):
-        self._with_frames = with_frames
-        self._color, self._depth, self._depth_frame = None, None, ''
-        self._depth_topic = rospy.resolve_name(DEPTH_TOPIC)
-        subscribe(DEPTH_TOPIC, Image, self._on_depth_image, KEPT_AT_ONCE)
-        subscribe_camera_info(INFO_TOPICS[0], DEPTH_TOPIC, self._on_color_camera)
-        rospy.Subscriber(info_topic_beside(self._depth_topic), CameraInfo, self._on_depth_camera, queue_size=1)
+        self._with_frames, depth_topic = with_frames, rospy.resolve_name(DEPTH_TOPIC)
+        self._newest = newest = {}  # depth_frame, and the CameraInfo color and depth
+        subscribe(DEPTH_TOPIC, Image, lambda message: newest.update(depth_frame=message.header.frame_id), KEPT_AT_ONCE)
+        subscribe_camera_info(INFO_TOPICS[0], DEPTH_TOPIC, lambda message: newest.update(color=message))
+        rospy.Subscriber(info_topic_beside(depth_topic), CameraInfo,
+                         lambda message: newest.update(depth=info_of_images(message, depth_topic)), queue_size=1)
 
     def faults(self):
         """Yield (event, sentence) for each current fault. Called once per second."""
-        color, depth, fault = self._color, self._depth, ''
+        color, depth, fault = self._newest.get('color'), self._newest.get('depth'), ''
         if color is not None and self._with_frames:
-            fault = frames_fault(color.header.frame_id, self._depth_frame)
+            fault = frames_fault(color.header.frame_id, self._newest.get('depth_frame', ''))
         if color is not None and depth is not None and not fault:
             try:
                 fault = intrinsics_fault(camera_from_msg(color), camera_from_msg(depth))
@@ -108,15 +108,6 @@ class DepthCameraCheck(object):
                 pass
         if fault:
             yield 'alignment', 'depth is not aligned to colour: %s; positions are wrong; %s' % (fault, ALIGN)
-
-    def _on_depth_image(self, message):
-        self._depth_frame = message.header.frame_id
-
-    def _on_color_camera(self, message):
-        self._color = message
-
-    def _on_depth_camera(self, message):
-        self._depth = info_of_images(message, self._depth_topic)
 
 
 class SampleImages(object):
