@@ -93,15 +93,10 @@ def _preprocessing(dtype, head, settings):
     if dtype == np.uint8:
         if settings.mean or settings.std:
             raise ValueError('its input is uint8, to which mean and std of the YAML file do not apply')
-        return functools.partial(_uint8_batch_of, order=order)
+        return functools.partial(batch_of, order=order, std=(1.0, 1.0, 1.0), dtype=dtype)
     step = 1 if color == head.color else -1
     return functools.partial(batch_of, order=order, mean=tuple(settings.mean or head.mean[::step]),
                              std=tuple(settings.std or head.std[::step]), dtype=dtype)
-
-
-def _uint8_batch_of(image, order=RGB):
-    """Batch (1, 3, height, width) of an RGB image, uint8, with the channels in the given order."""
-    return np.ascontiguousarray(image.transpose(2, 0, 1)[list(order)][None])
 
 
 def _input_layout(shape):

@@ -6,7 +6,7 @@ network, one per scale, contain the same predictions before decoding.
 import numpy as np
 
 from ros_3d_bb.detection.network_detector import Resize
-from ros_3d_bb.detection.onnx.decoders import decode_rows
+from ros_3d_bb.detection.onnx.decoders import decode_rows, sigmoid
 
 
 class Backend(object):
@@ -55,8 +55,7 @@ def decode_heads(heads, anchors_px, strides, min_objectness):
 def _decode_head(head, anchors_px, stride, min_logit):
     values = head.reshape((len(anchors_px), -1) + head.shape[2:])
     anchor, line, column = np.nonzero(values[:, 4] > min_logit)
-    with np.errstate(over='ignore'):  # for large negative values the result is 0
-        rows = 1 / (1 + np.exp(-values[anchor, :, line, column].astype(np.float32)))
+    rows = sigmoid(values[anchor, :, line, column].astype(np.float32))
     rows[:, :2] = (rows[:, :2] * 2 - 0.5 + np.stack((column, line), axis=1)) * stride
     rows[:, 2:4] = (rows[:, 2:4] * 2) ** 2 * anchors_px[anchor]
     return rows
