@@ -29,11 +29,6 @@ def image_of(height=96, width=128):
     return np.random.RandomState(0).randint(0, 256, (height, width, 3)).astype(np.uint8)
 
 
-def assert_same_predictions(runtime, network, image):
-    expected = torch_backend.run(network, image, -1)
-    np.testing.assert_allclose(runtime(image, -1), expected, atol=1e-3, rtol=1e-4)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize('params', BOTH)
 @pytest.mark.parametrize('random', [None, ('6.0', 'n'), ('5.0', 's')])
@@ -66,7 +61,8 @@ def test_every_kind_of_network_is_exported(tmp_path, release, model, changes):
     network = write_checkpoint(path, dict(layout(release, model, 3), **changes), anchor_grid=release == '5.0')
     runtime = open_runtime(path, ON_ONNX)
     assert runtime.stride == (64 if model == 'n6' else 32)
-    assert_same_predictions(runtime, network, image_of(128, 64))
+    expected = torch_backend.run(network, image_of(128, 64), -1)
+    np.testing.assert_allclose(runtime(image_of(128, 64), -1), expected, atol=1e-3, rtol=1e-4)
 
 
 def test_torchscript_exports_are_run(tmp_path):
