@@ -70,7 +70,7 @@ def test_3d_boxes_do_not_wait_for_a_master_to_subscribe_colour():
             mock.patch('ros_3d_bb.nodes.bbox3d_node.patient_master', side_effect=OSError('no route')) as query:
         publisher.return_value.get_num_connections.return_value = 1
         diagnostics = mock.MagicMock()
-        frame = mock.Mock(received_depth=DepthImage(np.zeros((4, 4), np.uint16), 0.001))
+        frame = mock.Mock(received=mock.Mock(depth=DepthImage(np.zeros((4, 4), np.uint16), 0.001)))
         images = SampleImages(Bbox3dParams(), None, diagnostics)
         images.publish(Header(), frame, [])
         wait_until(lambda: diagnostics.warn.called, 'a warning')

@@ -67,7 +67,7 @@ class Bbox3dNode(object):
         with self._diagnostics.rejecting('2D boxes'):
             frame = self._inputs.source.frame(boxes2d, depth_msg, camera)
             boxes3d = self._stage.estimate(frame, boxes2d)
-            message = boxes3d_to_msg(boxes3d, header_of(frame), frame.received_camera)
+            message = boxes3d_to_msg(boxes3d, header_of(frame), frame.received.camera)
             self._boxes_pub.publish(message)
             self._diagnostics.record_latency(message.header.stamp)
             if self._next_stage is not None:
@@ -147,7 +147,7 @@ class SampleImages(object):
             self._subscription.offer(needs_raw or needs_color)
         if not (needs_raw or needs_color or needs_depth):
             return
-        depth = frame.received_depth
+        depth = frame.received.depth
         if needs_depth:
             grey = depth_to_grey(depth, self.depth_range_m)
             self._depth_pub.publish(fill_image(Image(header=header), grey, 'mono8'))

@@ -43,4 +43,4 @@ class DepthDetectorNode(object):
         with self._detecting:
             frame = self._inputs.source.frame(*messages)
             detections = self._stage.detect(frame)
-        return None if detections is None else (frame.received_color, detections)
+        return None if detections is None else (frame.received.color, detections)
