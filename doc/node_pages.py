@@ -109,13 +109,14 @@ def node_of(module_name):
 def split(kind):
     """The docstring of a class before its sections, and {section: [Entry]}.
 
-    An entry is `name : type`, with the indented text below.
+    An entry is `name : type`, or `name,name : type`, with the indented text below.
     """
     text, *parts = re.split(r'^(%s)\n-+\n' % '|'.join(SECTIONS), inspect.getdoc(kind) or '', flags=re.MULTILINE)
     sections = {}
     for title, body in zip(parts[::2], parts[1::2]):
         found = re.findall(r'^(\S+) : (\S+)\n((?:[ ]+.*\n?)+)', body, re.MULTILINE)
-        sections[title] = [Entry(name, kind, _one_line(text)) for name, kind, text in found]
+        sections[title] = [Entry(name, kind, _one_line(text)) for names, kind, text in found
+                           for name in names.split(',')]
     return text, sections
 
 

@@ -1,4 +1,5 @@
 import os
+from collections import namedtuple
 
 import numpy as np
 import pytest
@@ -20,12 +21,8 @@ ALL = DetectionParams(classes=list(range(3)))
 TIE = 2e-5  # scores that differ by less are in another order after other rounding
 pytestmark = pytest.mark.needs('onnxruntime')
 
-
-class Reference(object):
-    """A network, images, and the detections (n, 6) that ultralytics found in them."""
-
-    def __init__(self, path, images, detections):
-        self.path, self.images, self.detections = path, images, detections
+# A network, images, and the detections (n, 6) that ultralytics found in them.
+Reference = namedtuple('Reference', 'path images detections')
 
 
 @pytest.fixture(scope='module', params=['yolov8n', 'yolo11n', 'yolo26n', 'yolov8n-seg'])

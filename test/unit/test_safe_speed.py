@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from ros_3d_bb.planning.blind_corners import LEAST_WIDTH_M, blind_corners
 from ros_3d_bb.planning.planner_view import position_after
-from ros_3d_bb.planning.safe_speed import (CornerParams, SafeSpeedParams, highest_safe_speed, limited_velocity,
-                                           speed_before_corners)
+from ros_3d_bb.planning.safe_speed import (LEAST_WIDTH_M, CornerParams, SafeSpeedParams, blind_corners,
+                                           highest_safe_speed, limited_velocity, speed_before_corners)
 from ros_3d_bb_lab.simulation.laser import BEAMS, FIELD_OF_VIEW, RANGE_M, scan_ranges
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from support.tracks import track_at
@@ -174,8 +173,7 @@ def test_the_robot_slows_down_until_it_has_passed_the_corner():
 def stopped_before(speed_mps, corner_m, people_mps):
     """Whether a robot that brakes from a speed stands before anyone from the corner can touch it."""
     times_s = np.arange(0, SAFETY.reaction_time + speed_mps / SAFETY.deceleration, 0.01)
-    braking_s = np.maximum(times_s - SAFETY.reaction_time, 0)
-    robot_m = np.column_stack((speed_mps * times_s - SAFETY.deceleration * braking_s ** 2 / 2, 0 * times_s))
+    robot_m = np.column_stack((place_after(speed_mps, times_s), 0 * times_s))
     return (np.linalg.norm(robot_m - corner_m, axis=1) - people_mps * times_s > SAFETY.robot_radius).all()
 
 

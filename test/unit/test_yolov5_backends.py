@@ -1,16 +1,15 @@
-import json
 import sys
 
 import numpy as np
 import pytest
-import torch
 
 from ros_3d_bb.detection.weights import WeightsError
 from ros_3d_bb.detection.yolov5 import backends, torch_backend
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_runtime
-from support.checkpoints import random_network, write_checkpoint
+from support.checkpoints import write_checkpoint
 from support.layouts import layout
 from support.official_reference import made
+from support.red_detector import write_red_detector
 
 
 needs_onnx = pytest.mark.needs('onnxruntime', 'onnx')
@@ -28,11 +27,6 @@ def checkpoint(tmp_path_factory):
 
 def image_of(height=96, width=128):
     return np.random.RandomState(0).randint(0, 256, (height, width, 3)).astype(np.uint8)
-
-
-def assert_same_predictions(runtime, network, image):
-    expected = torch_backend.run(network, image).numpy()
-    np.testing.assert_allclose(runtime(image, -1), expected, atol=1e-3, rtol=1e-4)
 
 
 @pytest.mark.slow
@@ -67,18 +61,17 @@ def test_every_kind_of_network_is_exported(tmp_path, release, model, changes):
     network = write_checkpoint(path, dict(layout(release, model, 3), **changes), anchor_grid=release == '5.0')
     runtime = open_runtime(path, ON_ONNX)
     assert runtime.stride == (64 if model == 'n6' else 32)
-    assert_same_predictions(runtime, network, image_of(128, 64))
+    expected = torch_backend.run(network, image_of(128, 64), -1)
+    np.testing.assert_allclose(runtime(image_of(128, 64), -1), expected, atol=1e-3, rtol=1e-4)
 
 
-@pytest.mark.slow
-def test_torchscript_exports_give_the_same_predictions(tmp_path):
-    network = random_network(layout('6.0', 'n', 3)).fuse()
-    path = str(tmp_path / 'model.torchscript')
-    config = {'shape': [1, 3, 96, 128], 'stride': 32, 'names': {'0': 'person'}}
-    torch.jit.trace(network, torch.zeros(1, 3, 96, 128)).save(path, _extra_files={'config.txt': json.dumps(config)})
-    runtime = open_runtime(path)
-    assert runtime.input_hw == (96, 128) and runtime.stride == 32 and runtime.names[0] == 'person'
-    assert_same_predictions(runtime, network, image_of())
+def test_torchscript_exports_are_run(tmp_path):
+    runtime = open_runtime(write_red_detector(str(tmp_path / 'model.torchscript'), 96))
+    assert runtime.input_hw == (96, 96) and runtime.stride == 32 and runtime.names[:2] == ['person', 'thing 1']
+    image = np.zeros((96, 96, 3), np.uint8)
+    assert runtime(image, 0.1).shape == (0, 85)
+    image[20:50, 10:50, 0] = 255
+    np.testing.assert_allclose(runtime(image, 0.1)[:, :7], [(30, 35, 40, 30, 0.95, 0.98, 0)])
 
 
 @pytest.mark.parametrize('edit', [

@@ -1,28 +1,45 @@
+import os
+from unittest import mock
+
 import numpy as np
 import pytest
+from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray
+from std_srvs.srv import SetBoolRequest
 
-from fuzz.hostile import good_messages, transforms
+from fuzz.hostile import CAMERA, good_messages, transforms
 from fuzz.nodes import send_image
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
-from ros_3d_bb.conversions.image_msgs import imgmsg_to_rgb
-from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, boxes2d_from_msg, time_from
+from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth, imgmsg_to_rgb
+from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg,
+                                                   boxes3d_to_msg, stamp_of, time_from)
+from ros_3d_bb.core.latest_worker import NewestWorker
+from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
+from ros_3d_bb.detection.network_detector import DetectionParams
+from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
+from ros_3d_bb.nodes.common import detector_output
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
+from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.nodes.viewer_node import ViewerNode
+from ros_3d_bb.nodes.yolov5_node import Yolov5Node
 from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
-from ros_3d_bb.sessions.session_reader import read_session
+from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams
+from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb.visualization.image_overlay import VALID_COLOR
+from ros_3d_bb.visualization.markers import AREA, MARKERS_TOPIC, MarkerParams
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
+from support.launching import loaded
 from support.masterless import masterless
-from support.ros import depth_message
+from support.ros import depth_message, header_at, wait_until
+from support.two_cameras import boxes
 
 START_NS = 1000 * NS
 
@@ -50,7 +67,6 @@ def test_boxes_become_3d_in_the_frame_and_at_the_stamp_of_the_image(connections)
 
 def test_boxes_without_a_stamp_get_the_image_that_arrived_before_them(connections, monkeypatch):
     """Of two images 0.4 s apart, the one 0.05 s (~assumed_delay) before."""
-    monkeypatch.setattr('ros_3d_bb.nodes.bbox3d_node.arrival_clock_ns', lambda: connections.now.to_nsec())
     monkeypatch.setattr('ros_3d_bb.nodes.common.rgbd_inputs.arrival_clock_ns', lambda: connections.now.to_nsec())
     for stamp_ns, depth_mm in (START_NS, 1500), (START_NS + 2 * NS // 5, 2000):
         connections.now = time_from(stamp_ns)
@@ -123,6 +139,133 @@ def test_nothing_is_published_while_no_floor_is_known():
     """Neither from tf nor from a depth image: an empty array would mean that there are no people."""
     message, _drawn, counts, _true_boxes = answer('unknown_to_tf', people=[], robot={'pitch': -0.9})
     assert message is None and counts['images without floor'] == 1
+
+
+@pytest.fixture
+def camera(weights):
+    """The connections of the node, whose workers work at once."""
+    parameters, _nodes = loaded('yolov5.launch', 'weights:=' + weights)
+    with masterless({name.rpartition('/')[2]: value for name, value in parameters.items()}) as connections:
+        yield connections
+
+
+@pytest.fixture
+def image(session_folder):
+    """A colour image with a person, and the person's box."""
+    session = read_session(session_folder)
+    return read_color(session.frames[15], session.camera), session.frames[15].boxes_px[0]
+
+
+def newest(camera):
+    message = camera.publishers[BOXES_TOPIC].newest
+    return message and boxes2d_from_msg(message)
+
+
+def sent(camera, image, stamp_ns=START_NS):
+    """The newest boxes after an image."""
+    camera.send(COLOR_TOPIC, fill_image(Image(header=header_at(stamp_ns)), image, 'rgb8'))
+    return newest(camera)
+
+
+@pytest.mark.needs('torch')
+def test_the_person_is_detected_and_drawn_at_the_stamp_of_the_image(camera, image):
+    Yolov5Node()
+    pixels, box = image
+    boxes, drawn = sent(camera, pixels), camera.publishers['yolo_result_out'].newest
+    assert boxes.stamp_ns == START_NS == stamp_of(drawn) and boxes.frame_id == 'camera_color_optical_frame'
+    assert boxes.labels == ('person',) and 0.25 < boxes.scores[0] < 1
+    assert iou(np.array(box, float), boxes.boxes).tolist() > [0.8]
+    lines, columns = np.nonzero((imgmsg_to_rgb(drawn) != pixels).any(axis=2))
+    assert abs(columns.max() - box[2]) < 30 and abs(lines.max() - box[3]) < 30
+
+
+@pytest.mark.needs('torch')
+def test_the_service_pauses_and_changed_parameters_apply_from_the_next_image_on(camera, image):
+    """An empty array means that no people were detected."""
+    node = Yolov5Node()
+    assert 'paused' in node._worker._on_request(SetBoolRequest(False)).message
+    assert sent(camera, image[0]) is None and node._worker._on_request(SetBoolRequest(True)).success
+    for changes, count in (({'confidence': 1.0}, 0), ({}, 1), ({'image_size': 320}, 1), ({'image_size': 0}, 1)):
+        node._set_params(DetectionParams(**changes))
+        assert len(sent(camera, image[0]).boxes) == count
+    with pytest.raises(ValueError, match='unicorn'):
+        node._set_params(DetectionParams(confidence=1.0, classes=['unicorn']))
+    assert len(sent(camera, image[0]).boxes) == 1
+
+
+@pytest.mark.needs('torch')
+def test_the_newest_image_is_processed_and_others_are_skipped(camera, image, monkeypatch):
+    monkeypatch.setattr(detector_output, 'NewestWorker', NewestWorker)
+    node = Yolov5Node()
+    for number in range(60):
+        sent(camera, image[0], START_NS + number)
+    wait_until(lambda: newest(camera) and newest(camera).stamp_ns == START_NS + 59, 'the boxes of the last image')
+    assert camera.publishers[BOXES_TOPIC].count + node._diagnostics.counts['images skipped for a newer one'] == 60
+
+
+def test_no_track_starts_in_ignored_areas_nor_behind_cells_of_the_map():
+    """A person 3 m ahead, one in an area at 5 m, and a poster on a wall at 7 m; the wall ends before y = 2."""
+    grid = OccupancyGrid(header=header_at(0, 'map'), data=[100] * 20)
+    grid.info.width, grid.info.height, grid.info.resolution = 1, 20, 0.1
+    grid.info.origin.position.x, grid.info.origin.position.y, grid.info.origin.orientation.w = 7.0, -1.0, 1.0
+    parameters, nodes = loaded('tracker.launch', 'map:=static_map')
+    assert ('map', 'static_map') in [tuple(remapping) for remapping in nodes['tracker_node'].remap_args]
+    with masterless({'use_map': parameters['/tracker_node/use_map'], 'tf_timeout': 0.0}) as connections:
+        node, areas = TrackerNode(), '[[[4.5, -0.5], [5.5, -0.5], [5.5, 0.5], [4.5, 0.5]]]'
+        node._reconfigure(*params_from({'ignored_areas': areas}, TrackerNodeParams, MarkerParams, *TRACKING_PARAMS))
+        connections.send('map', grid)
+        for number in range(10):
+            stamp_ns = START_NS + number * NS // 10
+            connections.send('/tf', transforms(stamp_ns))
+            centers_m = (1.0, 0.2, 3.0), (0.0, 0.2, 5.0), (0.0, 0.2, 7.2), (-2.0, 0.2, 7.2)
+            connections.send(BOXES3D_TOPIC, boxes(stamp_ns, centers_m=centers_m))
+        message, markers = (connections.publishers[topic].newest for topic in (TRACKS_TOPIC, MARKERS_TOPIC))
+    assert message.header == header_at(stamp_ns, 'map')
+    assert sorted(round(track.pose.pose.position.y) for track in message.objects) == [-1, 2]
+    assert AREA in [marker.ns for marker in markers.markers]
+    assert node._diagnostics.counts['boxes in ignored areas'] >= 20
+
+
+@pytest.fixture
+def viewer(tmp_path):
+    """viewer_node, whose session is a folder to be created."""
+    parameters, _nodes = loaded('viewer.launch', 'session:=%s' % (tmp_path / 'a session'), 'window:=false')
+    with masterless({name.rpartition('/')[2]: value for name, value in parameters.items()}) as connections:
+        connections.node, connections.folder = ViewerNode(), parameters['/viewer_node/session']
+        yield connections
+
+
+def test_captures_are_appended_and_an_image_is_stored_once(viewer):
+    viewer.send(COLOR_TOPIC, Image())  # rejected
+    assert not viewer.node.capture()[0] and not os.path.exists(viewer.folder)
+    box = Box3D(np.array([0.5, 0.1, 3.0]), np.array([0.5, 1.7, 0.5]), (26, 8, 38, 44), 0.75, (False,) * 4)
+    for number, label in enumerate('AB'):
+        messages = good_messages(START_NS + number)
+        messages[BOXES3D_TOPIC] = boxes3d_to_msg([box], messages[BOXES3D_TOPIC].header, CAMERA)
+        send_image(viewer, START_NS + number, messages)
+        with mock.patch('ros_3d_bb.nodes.common.label.patient_master') as master:
+            master.return_value.getParam.return_value = label
+            assert viewer.node.capture()[0] and not viewer.node.capture()[0]
+    session = read_session(viewer.folder)
+    assert (session.camera, session.frame_id) == (CAMERA, 'camera')
+    assert [(frame.stamp_ns, frame.label) for frame in session.frames] == [(START_NS, 'A'), (START_NS + 1, 'B')]
+    for frame in session.frames:
+        np.testing.assert_array_equal(read_color(frame, session.camera), imgmsg_to_rgb(messages[COLOR_TOPIC]))
+        np.testing.assert_array_equal(read_depth(frame, session).values, imgmsg_to_depth(messages[DEPTH_TOPIC]).values)
+        assert frame.boxes_px == ((26, 8, 38, 44),)
+        np.testing.assert_allclose([detection.estimate_m for detection in frame.detections], [[0.5, 0.1, 3.0]])
+
+
+def test_images_without_boxes_are_stored_after_a_warning(viewer):
+    for number in range(12):
+        messages = good_messages(START_NS + number * NS // 10)
+        del messages[BOXES_TOPIC], messages[BOXES3D_TOPIC]
+        send_image(viewer, START_NS + number * NS // 10, messages)
+    is_stored, answer = viewer.node.capture()
+    assert not is_stored and 'no 3D boxes received on /ros_3d_bb/bb_3d' in answer
+    assert viewer.node.capture()[0]
+    stored, = read_session(viewer.folder).frames
+    assert stored.stamp_ns == START_NS + 11 * NS // 10 and stored.detections == ()
 
 
 def test_the_tilt_of_the_camera_is_stored_once_it_is_known(tmp_path):

@@ -19,8 +19,8 @@ from ros_3d_bb.nodes.bbox3d_node import SampleImages
 from ros_3d_bb.nodes.common import master, startup, subscribers
 from ros_3d_bb.nodes.common.detector_output import DetectorWorker
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics, unsubscribed_results
+from ros_3d_bb.nodes.common.startup import Part
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
-from ros_3d_bb.nodes.common.part import Part
 from ros_3d_bb.nodes.tracker_node import RESERVED_IDS, TrackIdReservation
 from support.ros import wait_until
 
@@ -70,7 +70,7 @@ def test_3d_boxes_do_not_wait_for_a_master_to_subscribe_colour():
             mock.patch('ros_3d_bb.nodes.bbox3d_node.patient_master', side_effect=OSError('no route')) as query:
         publisher.return_value.get_num_connections.return_value = 1
         diagnostics = mock.MagicMock()
-        frame = mock.Mock(received_depth=DepthImage(np.zeros((4, 4), np.uint16), 0.001))
+        frame = mock.Mock(received=mock.Mock(depth=DepthImage(np.zeros((4, 4), np.uint16), 0.001)))
         images = SampleImages(Bbox3dParams(), None, diagnostics)
         images.publish(Header(), frame, [])
         wait_until(lambda: diagnostics.warn.called, 'a warning')
@@ -113,37 +113,26 @@ def test_an_input_subscribed_while_the_others_are_listed_is_kept():
         assert [each.name for each in subscribers.inputs()] == ['first', 'second']
 
 
-def test_a_static_map_that_is_published_once_is_no_silent_input():
-    """Nor does its stamp show that clocks differ. Without a publisher, it is missing."""
-    with mock.patch('rospy.Subscriber') as subscriber, mock.patch.object(subscribers, '_inputs', []) as inputs, \
-            mock.patch.object(subscribers, '_cause_of_silence', return_value='no publishers'), \
-            mock.patch('rospy.get_rostime', lambda: rospy.Time(1000)):
-        subscribers.subscribe('map', OccupancyGrid, lambda _message: None, is_irregular=True)
-        monitor = subscribers.InputMonitor()
-        inputs[0].take(OccupancyGrid(header=Header(stamp=rospy.Time(100))))
-        assert not list(monitor.faults())
-        inputs[0].count, inputs[0].received_s, monitor._began_s = 0, None, -100.0
-        assert not list(monitor.faults())
-        subscriber().get_num_connections.return_value = 0
-        assert list(monitor.faults()) == [('silence on map', 'no publishers')]
-
-
-def test_a_camera_info_that_is_published_once_is_no_silent_input():
-    """Without a publisher, it is missing, for a node that is restarted."""
+@pytest.mark.parametrize('subscribe, kind, before, count', [
+    (lambda: subscribers.subscribe('once', OccupancyGrid, str, is_irregular=True), OccupancyGrid, [], 0),
+    (lambda: subscribers.subscribe_camera_info('once', 'image', str), CameraInfo, [('silence on once', 'silent')], 1)])
+def test_what_is_published_once_is_no_silent_input(subscribe, kind, before, count):
+    """Nor does its stamp show that clocks differ. Only a camera_info is awaited. Without a publisher, a map is missing
+    if it has not arrived, and a camera_info in any case, for a node that is restarted."""
     with mock.patch('rospy.Subscriber') as subscriber, mock.patch.object(subscribers, '_inputs', []) as inputs, \
             mock.patch.object(subscribers, '_cause_of_silence', return_value='silent'), \
             mock.patch('rospy.get_rostime', lambda: rospy.Time(1000)):
         subscriber().get_num_connections.return_value = 1
-        subscribers.subscribe_camera_info('info', 'image', lambda _message: None)
+        subscribe()
         monitor = subscribers.InputMonitor()
         monitor._began_s = -100.0
-        assert list(monitor.faults()) == [('silence on info', 'silent')]
-        inputs[0].take(CameraInfo(header=Header(stamp=rospy.Time(100))))
+        assert list(monitor.faults()) == before
+        inputs[0].take(kind(header=Header(stamp=rospy.Time(100))))
         assert not list(monitor.faults())
         inputs[0].received_s = -100.0
         assert not list(monitor.faults())
-        subscriber().get_num_connections.return_value = 0
-        assert list(monitor.faults()) == [('silence on info', 'silent')]
+        inputs[0].count, subscriber().get_num_connections.return_value = count, 0
+        assert list(monitor.faults()) == [('silence on once', 'silent')]
 
 
 def test_topics_of_dynamic_reconfigure_are_no_results():

@@ -26,6 +26,13 @@ def test_the_transform_is_that_of_the_stamp():
         assert transforms.lookup('map', 'base_link', STAMP + rospy.Duration(0.5))[0, 3] == 0.5
 
 
+def test_a_late_transform_is_awaited():
+    with masterless() as connections:
+        transforms, message = Transforms(wait_s=10.0), TFMessage([link('map', 'base_link')])
+        threading.Timer(0.1, connections.send, ('/tf', message)).start()
+        assert transforms.lookup('map', 'base_link', STAMP)[0, 3] == 0
+
+
 @pytest.fixture
 def transforms():
     """tf knows neither camera."""

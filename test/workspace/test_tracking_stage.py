@@ -8,8 +8,7 @@ from std_msgs.msg import Header
 
 from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.conversions.image_msgs import fill_image
-from ros_3d_bb.conversions.map_msgs import occupied_from_msg
-from ros_3d_bb.conversions.perception_msgs import time_from
+from ros_3d_bb.conversions.perception_msgs import occupied_from_msg, time_from
 from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.error_model import read_error_model, write_error_model

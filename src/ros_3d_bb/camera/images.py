@@ -88,41 +88,29 @@ class RgbdFrame(NamedTuple):
         return None if self.camera_from_floor is None else tuple(self.camera_from_floor[:3, 2].tolist())
 
     @property
-    def received_camera(self):
-        """The Camera of the received image."""
-        return turned_camera(self.camera, -self.turns)
+    def received(self):
+        """The frame as received, before it was turned upright."""
+        return self.turned(-self.turns)
 
-    @property
-    def received_depth(self):
-        """The depth image with the pixels of the received colour image."""
-        return turned_depth(self.depth, -self.turns)
-
-    @property
-    def received_color(self):
-        """The colour image as received."""
-        return turned_image(self.color, -self.turns)
+    def turned(self, turns):
+        """The frame turned by some clockwise quarter turns."""
+        if not turns:
+            return self
+        camera_from_floor = self.camera_from_floor
+        if camera_from_floor is not None:
+            camera_from_floor = camera_from_floor.copy()
+            camera_from_floor[:3] = turned_rotation(turns).dot(camera_from_floor[:3])
+        return self._replace(camera=turned_camera(self.camera, turns), depth=turned_depth(self.depth, turns),
+                             color=None if self.color is None else turned_image(self.color, turns),
+                             turns=self.turns + turns, camera_from_floor=camera_from_floor)
 
     def upright_rects(self, rects_px):
         """Rectangles (n, 4) of the received image in the upright image. Inverse of `received_rects`."""
-        return turned_boxes(rects_px, self.turns, *self.received_camera[:2]) if self.turns else rects_px
+        return turned_boxes(rects_px, self.turns, *turned_camera(self.camera, -self.turns)[:2])
 
     def received_rects(self, rects_px):
         """Rectangles (n, 4) of the upright image in the received image."""
         return turned_boxes(rects_px, -self.turns, *self.camera[:2])
-
-
-def upright_frame(frame, image_rotation):
-    """Turn a RgbdFrame, as received, upright; `image_rotation` is as for `turns_for`."""
-    turns = turns_for(image_rotation, frame.up)
-    if not turns:
-        return frame
-    camera_from_floor = frame.camera_from_floor
-    if camera_from_floor is not None:
-        camera_from_floor = camera_from_floor.copy()
-        camera_from_floor[:3] = turned_rotation(turns).dot(camera_from_floor[:3])
-    return frame._replace(camera=turned_camera(frame.camera, turns), depth=turned_depth(frame.depth, turns),
-                          color=None if frame.color is None else turned_image(frame.color, turns), turns=turns,
-                          camera_from_floor=camera_from_floor)
 
 
 def turns_for(image_rotation, up):

@@ -97,8 +97,7 @@ def uncompressed(message):
 def messages_of(frame):
     """Yield (topic, message) of one CameraFrame, in the order in which a robot publishes them."""
     yield TF_TOPIC, TFMessage(transform_messages(frame.header.stamp, frame.transforms))
-    for message in image_messages_of(frame):
-        yield message
+    yield from image_messages_of(frame)
 
 
 def image_messages_of(frame):

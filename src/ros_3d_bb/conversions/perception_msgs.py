@@ -1,4 +1,4 @@
-"""Conversions between ROS messages and the detections, boxes, tracks and cameras of this package."""
+"""Conversions between ROS messages and the detections, boxes, tracks, cameras and maps of this package."""
 import functools
 import math
 import re
@@ -15,6 +15,7 @@ from ros_3d_bb.core.object_classes import MAX_COORDINATE_M, MAX_SIZE_M, PERSON, 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
+from ros_3d_bb.tracking.ignored_areas import OccupiedCells
 from ros_3d_bb.tracking.types import TrackedObject
 
 BOXES_TOPIC, BOXES3D_TOPIC, TRACKS_TOPIC = 'yolo_bounding_box', 'ros_3d_bb/bb_3d', 'ros_3d_bb/tracks'
@@ -25,6 +26,7 @@ ROUNDING = 1e-9  # tolerance of eigenvalues of a covariance, relative to its lar
 MAX_BOXES = 1000  # more boxes in one image are an error of the publisher and would stall the pipeline
 # Classes and scores follow the frame in the label of 2D boxes; frames may contain semicolons.
 CLASSES = re.compile(r'(?:;classes=([^;]*))?(?:;scores=([^;]*))?\Z')
+OCCUPIED = 65  # of 100, as from map_server (occupied_thresh)
 CORNERS = 'x1 y1 x2 y2'  # label of the second dimension, followed by the size of the image if it is known
 IMAGE_SIZE = re.compile(r' in ([0-9]{1,9}) x ([0-9]{1,9})\Z')
 
@@ -340,6 +342,19 @@ def _track_from_msg(track):
                          track.status, track.moving, track.first_seen.to_nsec(), track.last_seen.to_nsec(),
                          prediction_m, track.prediction_step.to_sec(), covariance, prediction_covariance_m2,
                          track.label or PERSON, track.score, track.detection)
+
+
+def occupied_from_msg(message):
+    """Convert a nav_msgs/OccupancyGrid to OccupiedCells. Raises ValueError if it is invalid."""
+    info, place, turn = message.info, message.info.origin.position, message.info.origin.orientation
+    yaw = 2 * np.arctan2(turn.z, turn.w)
+    if len(message.data) != info.width * info.height or not info.resolution > 0 or not np.isfinite(
+            [place.x, place.y, yaw, info.resolution]).all():
+        raise ValueError('it has %d cells of %g m, %d x %d at (%g, %g); cells of a positive size, their number, and '
+                         'a finite place expected' % (len(message.data), info.resolution, info.width, info.height,
+                                                      place.x, place.y))
+    cells = np.reshape(np.array(message.data, np.int8), (info.height, info.width)) >= OCCUPIED
+    return OccupiedCells(cells, info.resolution, (place.x, place.y, float(yaw)))
 
 
 def _covariance_3x3(with_covariance):

@@ -12,15 +12,14 @@ class EventCounter(object):
     def __init__(self, clock=None):
         self._lock = threading.Lock()  # a topic with two publishers has two threads
         self._clock = clock
-        self.counts = collections.OrderedDict()  # by event, in the order of first occurrence
-        self.received = collections.OrderedDict()  # number of inputs of each kind
+        self.counts = {}  # by event, in the order of first occurrence
+        self.received = {}  # number of inputs of each kind
         self.sentences = {}  # first message of each event that has one
         self.lags_ns = collections.deque(maxlen=MOST_LAGS)  # latencies of the newest results
 
     def count(self, event, amount=1):
         """Count an expected event."""
-        with self._lock:
-            self.counts[event] = self.counts.get(event, 0) + amount
+        self.count_all({event: amount})
 
     def count_all(self, amounts):
         """Count several events at once; `amounts` maps each event to its number."""

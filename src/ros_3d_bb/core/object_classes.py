@@ -1,6 +1,5 @@
 """Classes of objects: names, usual sizes, motion, and groups that detectors confuse. See config/classes.yaml."""
 import re
-from collections import OrderedDict
 from typing import NamedTuple, Optional
 
 import numpy as np
@@ -69,20 +68,20 @@ DEFAULT_CLASS = ObjectClass()  # of classes that are not listed
 # The distance to the axis of people is the mean over standing and walking bodies of the simulation, from all sides.
 PERSON_CLASS = ObjectClass(PERSON, 0.46, 1.7, axis=0.09)
 # The sizes of the other classes are estimates for usual objects, not measurements.
-CLASSES = OrderedDict([
-    (PERSON, PERSON_CLASS),
-    ('bicycle', ObjectClass('two-wheeler', 0.6, 1.1, 1.75, acceleration=2.0, initial_speed=2.0)),
-    ('motorcycle', ObjectClass('two-wheeler', 0.8, 1.1, 2.1, acceleration=2.0, initial_speed=2.0)),
-    ('dog', ObjectClass('pet', 0.22, 0.55, 0.55, acceleration=2.0)),
-    ('cat', ObjectClass('pet', 0.15, 0.3, 0.4, acceleration=2.0)),
-    ('chair', ObjectClass(_SEAT, 0.5, 0.9, axis=0.18, **_FURNITURE)),
-    ('couch', ObjectClass(_SEAT, 0.9, 0.85, 1.9, **_FURNITURE)),
-    ('bench', ObjectClass(_SEAT, 0.5, 0.85, 1.5, **_FURNITURE)),
-    ('suitcase', ObjectClass(_LUGGAGE, 0.3, 0.65, 0.45)),
-    ('backpack', ObjectClass(_LUGGAGE, 0.3, 0.5, axis=0.1)),
-    ('handbag', ObjectClass(_LUGGAGE, 0.3, 0.3, axis=0.1)),
-    ('trolley', ObjectClass('trolley', 0.45, 1.0, 0.6)),
-    ('potted plant', ObjectClass('potted plant', 0.4, 0.8, axis=0.15, **_FURNITURE))])
+CLASSES = {
+    PERSON: PERSON_CLASS,
+    'bicycle': ObjectClass('two-wheeler', 0.6, 1.1, 1.75, acceleration=2.0, initial_speed=2.0),
+    'motorcycle': ObjectClass('two-wheeler', 0.8, 1.1, 2.1, acceleration=2.0, initial_speed=2.0),
+    'dog': ObjectClass('pet', 0.22, 0.55, 0.55, acceleration=2.0),
+    'cat': ObjectClass('pet', 0.15, 0.3, 0.4, acceleration=2.0),
+    'chair': ObjectClass(_SEAT, 0.5, 0.9, axis=0.18, **_FURNITURE),
+    'couch': ObjectClass(_SEAT, 0.9, 0.85, 1.9, **_FURNITURE),
+    'bench': ObjectClass(_SEAT, 0.5, 0.85, 1.5, **_FURNITURE),
+    'suitcase': ObjectClass(_LUGGAGE, 0.3, 0.65, 0.45),
+    'backpack': ObjectClass(_LUGGAGE, 0.3, 0.5, axis=0.1),
+    'handbag': ObjectClass(_LUGGAGE, 0.3, 0.3, axis=0.1),
+    'trolley': ObjectClass('trolley', 0.45, 1.0, 0.6),
+    'potted plant': ObjectClass('potted plant', 0.4, 0.8, axis=0.15, **_FURNITURE)}
 RANGES = {'width': MAX_SIZE_M, 'height': MAX_SIZE_M, 'length': MAX_SIZE_M, 'axis': MAX_SIZE_M,
           'acceleration': LARGEST_FACTOR, 'initial_speed': LARGEST_FACTOR}
 
@@ -132,7 +131,7 @@ def object_classes_from(content):
         raise ValueError('it has %d classes; at most %d expected' % (len(given), MAX_CLASSES))
     if PERSON not in given:
         raise ValueError('the class %s is missing' % PERSON)
-    listed = OrderedDict((name, _class_from(name, entry)) for name, entry in given.items())
+    listed = {name: _class_from(name, entry) for name, entry in given.items()}
     default = _class_from('default', content.get('default') or {})
     if default.group is not None:
         raise ValueError('default.group is %r; each class that is not listed is a group of its own' % default.group)

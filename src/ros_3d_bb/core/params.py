@@ -2,7 +2,6 @@
 import difflib
 import re
 import sys
-from collections import OrderedDict
 from typing import Any, NamedTuple, Tuple, Union
 
 LARGEST = 1e6
@@ -62,7 +61,7 @@ def parameters(section=''):
     The Params are stored by name in the class attribute `PARAMS`. A Param without a section gets the given one.
     """
     def decorate(kind):
-        kind.PARAMS = OrderedDict()
+        kind.PARAMS = {}
         for name in kind._fields:
             param = kind._field_defaults[name]
             own_section = param.section or (section if param.text else SET_BY_LAUNCH)
@@ -75,7 +74,7 @@ def parameters(section=''):
 
 def table_of(kinds):
     """Merge the schemas of several types into one table, {name: Param}; shared names appear once."""
-    return OrderedDict((name, kind.PARAMS[name]) for kind in kinds for name in kind._fields)
+    return {name: kind.PARAMS[name] for kind in kinds for name in kind._fields}
 
 
 def params_from(given, *kinds):

@@ -1,4 +1,1 @@
-"""2D boxes, and the detectors that find people in images.
-
-May import: core.
-"""
+"""2D boxes, and the detectors that find people in images."""

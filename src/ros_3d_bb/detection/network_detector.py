@@ -1,4 +1,4 @@
-"""Detector that runs a network: resizing, network, class filter, non-maximum suppression.
+"""Detector that runs a network: resizing, conversion to a batch, network, class filter, non-maximum suppression.
 
 Convention: boxes are (x1, y1, x2, y2) in pixels of the image, x to the right, y down, x2 and y2 exclusive.
 """
@@ -11,6 +11,7 @@ from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.detection.adaptive_size import SIZES
 from ros_3d_bb.detection.boxes import Detections, non_maximum_suppression
 
+RGB, BGR = (0, 1, 2), (2, 1, 0)  # orders of the channels of an RGB image
 RESIZE_MODES = ('center', 'corner', 'stretch')
 MAX_INPUT_PX = 4096  # larger inputs exhaust the memory
 MAX_CANDIDATES = 30000  # maximum number of boxes before suppression, as in ultralytics
@@ -63,20 +64,14 @@ class Placement(NamedTuple):
 class NetworkDetector(object):
     """Detector that runs a network.
 
-    Parameters
-    ----------
-    network
-        A backend of `detection.yolov5.backends` or an `onnx.onnx_model.OnnxModel`. Its method `candidates` takes an
-        RGB image (height, width, 3), uint8, and a confidence, and returns the Detections above it in pixels of this
-        image, in any order. Its attributes are `names`, the class names; `stride`, of which height and width must be
-        multiples; `input_hw`, the only (height, width) that it accepts, or None if it accepts any; `resize`, a
-        `Resize`; `suppressed`, whether it suppresses overlapping boxes itself; and `description`, a text for logs.
-    params : DetectionParams
+    `network` is a backend of `detection.yolov5.backends` or an `onnx.onnx_model.OnnxModel`. Its method `candidates`
+    takes an RGB image (height, width, 3), uint8, and a confidence, and returns the Detections above it in pixels of
+    this image, in any order. Its attributes are `names`, the class names; `stride`, of which height and width must be
+    multiples; `input_hw`, the only (height, width) that it accepts, or None if it accepts any; `resize`, a `Resize`;
+    `suppressed`, whether it suppresses overlapping boxes itself; and `description`, a text for logs. `params` are
+    DetectionParams.
 
-    Raises
-    ------
-    ValueError
-        If there is no class to detect, or the model does not have one of the classes.
+    Raises ValueError if there is no class to detect, or the model does not have one of the classes.
     """
 
     def __init__(self, network, params=DetectionParams()):
@@ -144,6 +139,21 @@ def fit_image(image, input_hw, stride=None, resize=Resize()):
                                    value=(resize.padding,) * 3)
     scale_xy = (scaled_hw[1] / float(width), scaled_hw[0] / float(height)) if resize.mode == 'stretch' else (scale,) * 2
     return image, Placement(scale_xy, (left, top))
+
+
+def batch_of(image, order=RGB, mean=(0.0, 0.0, 0.0), std=(255.0, 255.0, 255.0), dtype=np.float32):
+    """Convert an RGB image (height, width, 3), uint8, to a batch (1, 3, height, width) of (value - mean) / std.
+
+    `order` is that of the channels in the batch, in mean and in std.
+    """
+    batch, channels = np.empty((1, 3) + image.shape[:2], dtype), cv2.split(image)
+    for plane, number, mean_value, std_value in zip(batch[0], order, mean, std):
+        plane[...] = channels[number]
+        if mean_value != 0:
+            plane -= dtype(mean_value)
+        if std_value != 1:
+            plane /= dtype(std_value)
+    return batch
 
 
 def ranked(detections, classes):

@@ -11,14 +11,13 @@ from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, b
                                                    header_of, stamp_of)
 from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.core.object_classes import described
-from ros_3d_bb.core.time_sync import NS, MessageCache, arrival_clock_ns
+from ros_3d_bb.core.time_sync import NS, MessageCache
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.master import patient_master
-from ros_3d_bb.nodes.common.part import Part
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.rgbd_inputs import RgbdInputs
-from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.startup import Part, read_params
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscribe_camera_info
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
 from ros_3d_bb.visualization.image_overlay import depth_to_grey, draw_boxes, draw_samples
@@ -52,6 +51,7 @@ class Bbox3dNode(object):
                                   cache_s=params.cache_length, assumed_delay_s=params.assumed_delay)
         if params.depth != RAW:
             self._diagnostics.check(DepthCameraCheck(with_frames=not params.frame_id).faults)
+        self.on_boxes = self._inputs.receiver('2D boxes', self._inputs.source.add_boxes)
         if part.subscribes:
             subscribe(BOXES_TOPIC, Int32MultiArray, self.on_boxes)
         ReconfigureServer([params], self._reconfigure, part.namespace)
@@ -62,17 +62,12 @@ class Bbox3dNode(object):
             self._inputs.source.set_assumed_delay(params.assumed_delay)
             self._images.depth_range_m = params.depth_image_range
 
-    def on_boxes(self, message):
-        """Process the 2D boxes of an image."""
-        with self._diagnostics.receiving('2D boxes'), self._inputs.lock:
-            self._inputs.source.add_boxes(message, arrival_clock_ns())
-
     def _on_match(self, boxes2d, depth_msg, camera):
         """Publish the 3D boxes of one image, once its 2D boxes, depth image and camera model have arrived."""
         with self._diagnostics.rejecting('2D boxes'):
             frame = self._inputs.source.frame(boxes2d, depth_msg, camera)
             boxes3d = self._stage.estimate(frame, boxes2d)
-            message = boxes3d_to_msg(boxes3d, header_of(frame), frame.received_camera)
+            message = boxes3d_to_msg(boxes3d, header_of(frame), frame.received.camera)
             self._boxes_pub.publish(message)
             self._diagnostics.record_latency(message.header.stamp)
             if self._next_stage is not None:
@@ -94,18 +89,18 @@ class DepthCameraCheck(object):
     """
 
     def __init__(self, with_frames):
-        self._with_frames = with_frames
-        self._color, self._depth, self._depth_frame = None, None, ''
-        self._depth_topic = rospy.resolve_name(DEPTH_TOPIC)
-        subscribe(DEPTH_TOPIC, Image, self._on_depth_image, KEPT_AT_ONCE)
-        subscribe_camera_info(INFO_TOPICS[0], DEPTH_TOPIC, self._on_color_camera)
-        rospy.Subscriber(info_topic_beside(self._depth_topic), CameraInfo, self._on_depth_camera, queue_size=1)
+        self._with_frames, depth_topic = with_frames, rospy.resolve_name(DEPTH_TOPIC)
+        self._newest = newest = {}  # depth_frame, and the CameraInfo color and depth
+        subscribe(DEPTH_TOPIC, Image, lambda message: newest.update(depth_frame=message.header.frame_id), KEPT_AT_ONCE)
+        subscribe_camera_info(INFO_TOPICS[0], DEPTH_TOPIC, lambda message: newest.update(color=message))
+        rospy.Subscriber(info_topic_beside(depth_topic), CameraInfo,
+                         lambda message: newest.update(depth=info_of_images(message, depth_topic)), queue_size=1)
 
     def faults(self):
         """Yield (event, sentence) for each current fault. Called once per second."""
-        color, depth, fault = self._color, self._depth, ''
+        color, depth, fault = self._newest.get('color'), self._newest.get('depth'), ''
         if color is not None and self._with_frames:
-            fault = frames_fault(color.header.frame_id, self._depth_frame)
+            fault = frames_fault(color.header.frame_id, self._newest.get('depth_frame', ''))
         if color is not None and depth is not None and not fault:
             try:
                 fault = intrinsics_fault(camera_from_msg(color), camera_from_msg(depth))
@@ -113,15 +108,6 @@ class DepthCameraCheck(object):
                 pass
         if fault:
             yield 'alignment', 'depth is not aligned to colour: %s; positions are wrong; %s' % (fault, ALIGN)
-
-    def _on_depth_image(self, message):
-        self._depth_frame = message.header.frame_id
-
-    def _on_color_camera(self, message):
-        self._color = message
-
-    def _on_depth_camera(self, message):
-        self._depth = info_of_images(message, self._depth_topic)
 
 
 class SampleImages(object):
@@ -161,7 +147,7 @@ class SampleImages(object):
             self._subscription.offer(needs_raw or needs_color)
         if not (needs_raw or needs_color or needs_depth):
             return
-        depth = frame.received_depth
+        depth = frame.received.depth
         if needs_depth:
             grey = depth_to_grey(depth, self.depth_range_m)
             self._depth_pub.publish(fill_image(Image(header=header), grey, 'mono8'))
@@ -196,7 +182,3 @@ class SampleImages(object):
     def _on_color(self, message):
         with self._diagnostics.rejecting('colour images'):
             self._colors.add(stamp_of(message), 0, message)
-
-
-def main():
-    run_node('bbox3d_node', Bbox3dNode)

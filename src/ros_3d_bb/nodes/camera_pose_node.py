@@ -9,7 +9,7 @@ from sensor_msgs.msg import Image
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, INFO_TOPICS, RAW, info_topic_beside, transform_messages
 from ros_3d_bb.core.params import DEPTH, DEPTH_SCALE, IMAGE_ROTATION, Param, parameters
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
-from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.startup import read_params
 from ros_3d_bb.nodes.common.subscribers import subscribe, subscribe_camera_info
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.pipeline.camera_pose import POSE_FITTED, POSE_TEXT, CameraPoseStage
@@ -40,10 +40,8 @@ class CameraPoseNode(object):
         Depth image; with ~depth raw on camera/depth/image_rect_raw.
     camera/color/camera_info : sensor_msgs/CameraInfo
         Calibration of the depth image, which is aligned to colour; with ~depth raw on camera/depth/camera_info.
-    /tf : tf2_msgs/TFMessage
+    /tf,/tf_static : tf2_msgs/TFMessage
         Frames of the camera driver.
-    /tf_static : tf2_msgs/TFMessage
-        As /tf.
 
     Publishes
     ---------
@@ -89,7 +87,3 @@ class CameraPoseNode(object):
         for unsubscribe in self._unsubscribers:
             unsubscribe()
         self._diagnostics.note(POSE_FITTED, '%s (from %s to %s)' % ((POSE_TEXT % self._stage.pose,) + link[:2]))
-
-
-def main():
-    run_node('camera_pose_node', CameraPoseNode)

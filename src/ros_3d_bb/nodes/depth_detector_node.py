@@ -4,14 +4,12 @@ import threading
 from sensor_msgs.msg import Image
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC
-from ros_3d_bb.core.time_sync import arrival_clock_ns
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.nodes.common.detector_output import DetectorWorker
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
-from ros_3d_bb.nodes.common.part import Part
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.rgbd_inputs import RgbdInputs
-from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.startup import Part, read_params
 from ros_3d_bb.nodes.common.subscribers import subscribe
 from ros_3d_bb.pipeline.detection_stage import DepthDetectionStage, DepthDetectorParams
 
@@ -34,23 +32,15 @@ class DepthDetectorNode(object):
         self._stage = DepthDetectionStage(params, people, self._diagnostics)
         self._worker = DetectorWorker(params, self._diagnostics, self._detect, self._stage.names, part)
         self._inputs = RgbdInputs(params, self._diagnostics, self._worker.offer, part.transforms)
-        subscribe(COLOR_TOPIC, Image, self._on_color)
+        subscribe(COLOR_TOPIC, Image, self._inputs.receiver('colour images', self._inputs.source.add_color))
         ReconfigureServer([params, people], self._reconfigure, part.namespace)
 
     def _reconfigure(self, params, people):
         with self._detecting:
             self._stage.reconfigure(params, people)
 
-    def _on_color(self, message):
-        with self._diagnostics.receiving('colour images'), self._inputs.lock:
-            self._inputs.source.add_color(message, arrival_clock_ns())
-
     def _detect(self, *messages):
         with self._detecting:
             frame = self._inputs.source.frame(*messages)
             detections = self._stage.detect(frame)
-        return None if detections is None else (frame.received_color, detections)
-
-
-def main():
-    run_node('depth_detector_node', DepthDetectorNode)
+        return None if detections is None else (frame.received.color, detections)

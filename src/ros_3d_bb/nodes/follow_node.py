@@ -14,7 +14,7 @@ from ros_3d_bb.core.params import CLASSES_FILE, ROBOT_FRAME, TRACKS_TIMEOUT, Par
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.latest_tracks import RobotTracks
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
-from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.startup import read_params
 from ros_3d_bb.planning.following import Follower, FollowParams, is_new_goal, is_reached
 from ros_3d_bb.planning.safe_speed import SafeSpeedParams
 
@@ -160,7 +160,3 @@ class FollowNode(object):
         if selector.target is None:
             return 'no person yet'
         return 'track %d is lost%s' % (selector.target.id, '; enable again' if selector.has_given_up else '')
-
-
-def main():
-    run_node('follow_node', FollowNode)

@@ -6,8 +6,7 @@ import rospy
 from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
-from ros_3d_bb.nodes.common.part import Part
-from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.startup import Part, read_params
 from ros_3d_bb.nodes.common.subscribers import AT_ONCE
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
@@ -43,7 +42,3 @@ class PeopleNode(object):
         if params.detector in DETECTORS:
             namespace, node = DETECTORS[params.detector]
             node(Part(namespace, tracker.transforms, bbox3d.on_boxes, monitors=False))
-
-
-def main():
-    run_node('people_node', PeopleNode, parts=('tracker_node', 'bbox3d_node', 'yolov5_node', 'depth_detector_node'))

@@ -15,7 +15,7 @@ from ros_3d_bb.core.params import DEPTH_SCALE, TRACKS_TIMEOUT, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.latest_tracks import LatestTracks
-from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.startup import read_params
 from ros_3d_bb.nodes.common.subscribers import subscribe, subscribe_camera_info
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.planning.people_removal import are_inside, cylinders_of, pixels_inside, scan_points
@@ -54,10 +54,8 @@ class PeopleRemovalNode(object):
         Depth image; with ~inputs depth.
     ~camera_info : sensor_msgs/CameraInfo
         Calibration of the depth image; with ~inputs depth.
-    /tf : tf2_msgs/TFMessage
+    /tf,/tf_static : tf2_msgs/TFMessage
         Poses of the sensors in the frame of the tracks.
-    /tf_static : tf2_msgs/TFMessage
-        As /tf.
 
     Publishes
     ---------
@@ -126,7 +124,3 @@ class PeopleRemovalNode(object):
         if self._camera is None or depth.shape != (self._camera.height, self._camera.width):
             raise ValueError('there is no camera_info with its size, %d x %d' % depth.shape[::-1])
         return depth_without(message.header, depth, pixels_inside(depth, self._camera, fixed_from_sensor, cylinders))
-
-
-def main():
-    run_node('people_removal_node', PeopleRemovalNode)

@@ -13,7 +13,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.latest_tracks import received_tracks
-from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.startup import read_params
 from ros_3d_bb.nodes.common.subscribers import subscribe
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.planning.planner_outputs import NAMES, outputs_from
@@ -103,10 +103,8 @@ class PlannerBridgeNode(object):
     ----------
     ros_3d_bb/tracks : ros_3d_bb/TrackedObjectArray
         Tracks.
-    /tf : tf2_msgs/TFMessage
+    /tf,/tf_static : tf2_msgs/TFMessage
         Transforms from the frame of the tracks to ~robot_frame (`costmap`) and ~planner_frame (`teb`, `mpc`).
-    /tf_static : tf2_msgs/TFMessage
-        As /tf.
 
     Publishes
     ---------
@@ -233,7 +231,3 @@ class PlannerBridgeNode(object):
 def _now_ns():
     """Return the ROS time to which positions are predicted; image stamps use the same clock."""
     return rospy.get_rostime().to_nsec()
-
-
-def main():
-    run_node('planner_bridge_node', PlannerBridgeNode)

@@ -14,11 +14,10 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.latest_tracks import RobotTracks
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
-from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.startup import read_params
 from ros_3d_bb.nodes.common.subscribers import subscribe
-from ros_3d_bb.planning.blind_corners import blind_corners
-from ros_3d_bb.planning.safe_speed import (CornerParams, SafeSpeedParams, highest_safe_speed, limited_velocity,
-                                           speed_before_corners)
+from ros_3d_bb.planning.safe_speed import (CornerParams, SafeSpeedParams, blind_corners, highest_safe_speed,
+                                           limited_velocity, speed_before_corners)
 
 PERIOD_S = 0.05  # between two limits; chosen: that of move_base's controller, and a tenth of the default timeout
 AHEAD = 0.0, 0.0, 0.0
@@ -114,7 +113,3 @@ class SpeedLimitNode(object):
             self._diagnostics.warn('no recent scan', 'no recent scan: the limit is ~corner_speed until there is one')
             return self._corner_params.corner_speed
         return speed_before_corners(self._corners_m, max(age_s, 0.0), velocity, self._safety, self._corner_params)
-
-
-def main():
-    run_node('speed_limit_node', SpeedLimitNode)

@@ -14,9 +14,8 @@ from ros_3d_bb.core.time_sync import arrival_clock_ns
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.master import on_new_master
-from ros_3d_bb.nodes.common.part import Part
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
-from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.startup import Part, read_params
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscribe_camera_info
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams, TrackingStage
@@ -45,10 +44,8 @@ class TrackerNode(object):
         Depth image, used to determine which tracks are occluded; not with ~tracker thesis or without ~use_depth.
     map : nav_msgs/OccupancyGrid
         Static map in ~target_frame, in whose occupied cells no track starts; only with ~use_map.
-    /tf : tf2_msgs/TFMessage
+    /tf,/tf_static : tf2_msgs/TFMessage
         Pose of the camera in ~target_frame.
-    /tf_static : tf2_msgs/TFMessage
-        As /tf.
 
     Publishes
     ---------
@@ -162,7 +159,3 @@ class TrackIdReservation(object):
         self._diagnostics.warn('track IDs not reserved', 'the ROS master does not accept the parameter %s (%s): a '
                                'restarted tracker may assign the same track IDs again; trying again'
                                % (self._name, error))
-
-
-def main():
-    run_node('tracker_node', TrackerNode)

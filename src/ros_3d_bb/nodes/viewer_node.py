@@ -21,7 +21,7 @@ from ros_3d_bb.core.time_sync import NS, arrival_clock_ns
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.label import Label
-from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.startup import read_params
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscribe_camera_info
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.sessions.burst import Burst
@@ -85,10 +85,8 @@ class ViewerNode(object):
         Starts the timer, as the key `t` does: a countdown and a burst of measurements. A second message cancels it.
     joy : sensor_msgs/Joy
         Joystick, such as a presenter on the floor mark: a button starts the timer.
-    /tf : tf2_msgs/TFMessage
+    /tf,/tf_static : tf2_msgs/TFMessage
         Transform from ~floor_frame to the camera, whose tilt is stored; not used if ~floor_frame is empty.
-    /tf_static : tf2_msgs/TFMessage
-        As /tf.
 
     Services
     --------
@@ -335,7 +333,3 @@ class ViewerNode(object):
 def _complain(future):
     if future.exception() is not None:
         rospy.logerr('the action of the key failed: %r', future.exception())
-
-
-def main():
-    run_node('viewer_node', ViewerNode, ViewerNode.run)

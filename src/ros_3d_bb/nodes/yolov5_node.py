@@ -11,9 +11,8 @@ from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_detector
 from ros_3d_bb.nodes.common.detector_output import DetectorWorker
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
-from ros_3d_bb.nodes.common.part import Part
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
-from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.startup import Part, read_params
 from ros_3d_bb.nodes.common.subscribers import subscribe
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.pipeline.detection_stage import CameraRotation, Yolov5NodeParams, detect_in_color
@@ -30,11 +29,9 @@ class Yolov5Node(object):
     ----------
     camera/color/image_raw : sensor_msgs/Image
         Colour image.
-    /tf : tf2_msgs/TFMessage
+    /tf,/tf_static : tf2_msgs/TFMessage
         Transform from ~floor_frame to the camera, which tells the edge of the image that is up. Subscribed until it is
         available; not used if ~image_rotation is given or ~floor_frame is empty.
-    /tf_static : tf2_msgs/TFMessage
-        As /tf.
     """
 
     def __init__(self, part=Part()):
@@ -79,7 +76,3 @@ class Yolov5Node(object):
                                    'up with the camera (~image_size 0)' % self._sizes.size)
         self._diagnostics.count('images processed')
         return result
-
-
-def main():
-    run_node('yolov5_node', Yolov5Node)

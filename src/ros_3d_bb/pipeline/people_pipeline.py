@@ -118,7 +118,7 @@ class PeoplePipeline(object):
         elif topic == DEPTH_INFO_TOPIC:
             if tracking_stage.uses_depth:
                 tracking_stage.add_depth_camera_info(message, camera)
-            source.add_depth_camera_info(message)
+            source.add_depth_camera_info(message, now_ns)
         elif topic == DEPTH_TOPIC:
             message = uncompressed(message)  # once for all stages
             if tracking_stage.uses_depth:
@@ -168,7 +168,7 @@ class PeoplePipeline(object):
         detections = self._detection_stages[camera].detect(frame)
         if detections is None:
             return
-        message = self._boxes2d(camera, header, frame.received_color, detections, DepthDetectionStage.names)
+        message = self._boxes2d(camera, header, frame.received.color, detections, DepthDetectionStage.names)
         if message is not None:
             self._events.count('arrays of 2D boxes')
             self._estimate_and_track(camera, frame, boxes2d_from_msg(message))
@@ -183,7 +183,7 @@ class PeoplePipeline(object):
 
     def _estimate_and_track(self, camera, frame, boxes2d):
         boxes3d = self._estimation_stages[camera].estimate(frame, boxes2d)
-        message = boxes3d_to_msg(boxes3d, header_of(frame), frame.received_camera)
+        message = boxes3d_to_msg(boxes3d, header_of(frame), frame.received.camera)
         self._results.append((topic_of(camera, BOXES3D_TOPIC), message))
         with self._events.rejecting('3D boxes'):
             self._tracking_stage.add_boxes(message, self._now_ns, camera)

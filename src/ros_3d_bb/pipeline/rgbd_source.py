@@ -2,7 +2,7 @@
 import tf2_ros
 
 from ros_3d_bb.camera.alignment import ALIGN, size_fault
-from ros_3d_bb.camera.images import RgbdFrame, upright_frame
+from ros_3d_bb.camera.images import RgbdFrame, turns_for
 from ros_3d_bb.camera.registration import RegisteredDepth
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, INFO_TOPICS, RAW
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
@@ -48,7 +48,7 @@ class RgbdSource(object):
         self._color_frame = message.header.frame_id
         self._sync.add_camera(stamp_if_any(message), now_ns, camera)
 
-    def add_depth_camera_info(self, message):
+    def add_depth_camera_info(self, message, _now_ns):
         """Add a sensor_msgs/CameraInfo of the depth camera, for raw depth."""
         self._registration.add_camera_info(message)
 
@@ -92,7 +92,7 @@ class RgbdSource(object):
                              'camera_info of this image' % (size + (self._info_topic, camera.width, camera.height)))
         frame = RgbdFrame(stamp_ns, depth_stamp_ns, frame_id, camera, depth, received.scale_m, color,
                           camera_from_floor=self._camera_from_floor(frame_id))
-        return upright_frame(frame, self._params.image_rotation)
+        return frame.turned(turns_for(self._params.image_rotation, frame.up))
 
     def _aligned(self, depth, depth_frame, camera):
         """Return a depth image with the pixels of colour, and the frame of the colour camera."""

@@ -12,8 +12,8 @@ from ros_3d_bb.camera.alignment import POSE, target_frame_fault
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, RAW, topic_of
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
-from ros_3d_bb.conversions.map_msgs import occupied_from_msg
-from ros_3d_bb.conversions.perception_msgs import camera_from_msg, stamp_of, time_from, usable_boxes3d
+from ros_3d_bb.conversions.perception_msgs import (camera_from_msg, occupied_from_msg, stamp_of, time_from,
+                                                   usable_boxes3d)
 from ros_3d_bb.core.object_classes import read_object_classes
 from ros_3d_bb.core.params import CLASSES_FILE, DEPTH, DEPTH_SCALE, SET_BY_LAUNCH, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, CameraClocks, MessageCache

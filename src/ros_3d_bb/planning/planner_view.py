@@ -105,11 +105,7 @@ def covariances_after(track, ahead_s):
 
 def _interpolated(rows, step_s, times_s):
     """Interpolate rows (k, n) at intervals of `step_s` linearly to times (...). Returns an array (..., n)."""
-    indices = np.arange(len(rows))
-    places = np.array(np.interp(times_s, step_s * indices, indices))  # fractional indices of the rows
-    before = places.astype(int)
-    after = np.minimum(before + 1, indices[-1])
-    return rows[before] + (places - before)[..., np.newaxis] * (rows[after] - rows[before])
+    return np.stack([np.interp(times_s, step_s * np.arange(len(rows)), column) for column in rows.T], axis=-1)
 
 
 def predicted_to(tracks, ahead_s):

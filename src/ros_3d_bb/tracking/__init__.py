@@ -1,4 +1,1 @@
-"""Multi-object tracking: from 3D boxes in a fixed frame to tracks with velocity, visibility and prediction.
-
-May import: camera, core.
-"""
+"""Multi-object tracking: from 3D boxes in a fixed frame to tracks with velocity, visibility and prediction."""

@@ -1,4 +1,1 @@
-"""People in depth images without a trained network: ground plane, clusters, classifier.
-
-May import: core, detection.
-"""
+"""People in depth images without a trained network: ground plane, clusters, classifier."""

@@ -1,4 +1,1 @@
-"""Detectors in ONNX files of any family: heads, preprocessing, and ONNX Runtime.
-
-May import: core, detection.
-"""
+"""Detectors in ONNX files of any family: heads, preprocessing, and ONNX Runtime."""

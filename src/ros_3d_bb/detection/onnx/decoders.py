@@ -59,7 +59,7 @@ def decode_distances(outputs, input_hw, classes, confidence, strides, offset=0.5
                           for part in (outputs[:len(strides)], outputs[len(strides):])])
     scores = rows[:, :classes]
     if not is_probability(scores):
-        scores = _sigmoid(scores)
+        scores = sigmoid(scores)
     above, best, scores = _best(scores, confidence)
     cells = grid(input_hw, strides)[above]
     distances = _expected_bins(rows[above, classes:])
@@ -106,7 +106,8 @@ def _rows_of(output):
     return output[0].reshape(len(output[0]), -1).T if output.ndim == 4 else output[0]
 
 
-def _sigmoid(values):
+def sigmoid(values):
+    """Logistic function."""
     with np.errstate(over='ignore'):  # for large negative values the result is 0
         return 1 / (1 + np.exp(-values))
 

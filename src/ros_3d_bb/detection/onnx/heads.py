@@ -1,6 +1,5 @@
 """Families of detection heads, and their recognition by the outputs of a network."""
 import functools
-from collections import OrderedDict
 from typing import Callable, NamedTuple, Tuple
 
 from ros_3d_bb.core.object_classes import COCO
@@ -31,18 +30,18 @@ class Head(NamedTuple):
     padding: int = 114
 
 
-HEADS = OrderedDict((
-    ('yolov5', Head(decode_rows, '(1, n, 5 + classes)')),
-    ('yolov8', Head(decode_columns, '(1, 4 + classes, n)')),
-    ('end-to-end', Head(decode_final, '(1, n, 6)', suppressed=True)),
-    ('yolox', Head(decode_yolox, '(1, n, 5 + classes)', P3, color='bgr', std=(1.0, 1.0, 1.0), resize='corner')),
-    ('yolox-decoded', Head(decode_rows, '(1, n, 5 + classes)', color='bgr', std=(1.0, 1.0, 1.0), resize='corner')),
-    ('nanodet', Head(decode_distances, '(1, n, classes + 4 * bins), or (1, n, classes) and (1, n, 4 * bins) by stride',
-                     P3, padding=0, **BLUE_FIRST)),
-    ('nanodet-plus', Head(functools.partial(decode_distances, offset=0.0), '(1, n, classes + 4 * bins)', P6,
-                          resize='stretch', **BLUE_FIRST)),
-    ('picodet', Head(decode_distances, '(1, n, classes) and (1, n, 4 * bins) by stride', P6, mean=IMAGENET_MEAN,
-                     std=IMAGENET_STD, resize='stretch'))))
+HEADS = {
+    'yolov5': Head(decode_rows, '(1, n, 5 + classes)'),
+    'yolov8': Head(decode_columns, '(1, 4 + classes, n)'),
+    'end-to-end': Head(decode_final, '(1, n, 6)', suppressed=True),
+    'yolox': Head(decode_yolox, '(1, n, 5 + classes)', P3, color='bgr', std=(1.0, 1.0, 1.0), resize='corner'),
+    'yolox-decoded': Head(decode_rows, '(1, n, 5 + classes)', color='bgr', std=(1.0, 1.0, 1.0), resize='corner'),
+    'nanodet': Head(decode_distances, '(1, n, classes + 4 * bins), or (1, n, classes) and (1, n, 4 * bins) by stride',
+                    P3, padding=0, **BLUE_FIRST),
+    'nanodet-plus': Head(functools.partial(decode_distances, offset=0.0), '(1, n, classes + 4 * bins)', P6,
+                         resize='stretch', **BLUE_FIRST),
+    'picodet': Head(decode_distances, '(1, n, classes) and (1, n, 4 * bins) by stride', P6, mean=IMAGENET_MEAN,
+                    std=IMAGENET_STD, resize='stretch')}
 
 
 class Layout(NamedTuple):
@@ -55,23 +54,11 @@ class Layout(NamedTuple):
 
 
 def layout_of(outputs, input_hw, metadata, head='', strides=(), names=()):
-    """Recognise a network by its outputs. Returns its Layout.
+    """Recognise a network by its outputs (list of ndarray) for any image with this height and width. Returns its
+    Layout.
 
-    Parameters
-    ----------
-    outputs : list of ndarray
-        Outputs for any image.
-    input_hw : tuple of int
-        Height and width of that image.
-    metadata : dict
-        Metadata of the file, {key: text}.
-    head, strides, names : optional
-        Name of the head, strides of its grid and names of its classes, where they are given.
-
-    Raises
-    ------
-    ValueError
-        If the outputs are not those of a known head, or not of what is given.
+    `metadata` are those of the file, {key: text}. The name of the head, the strides of its grid and the names of its
+    classes are optional. Raises ValueError if the outputs are not those of a known head, or not of what is given.
     """
     if metadata.get('task', 'detect') not in TASKS:
         raise ValueError('its task is %.40r; %s expected' % (metadata['task'], ', '.join(TASKS)))

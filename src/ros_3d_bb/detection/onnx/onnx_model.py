@@ -9,15 +9,14 @@ import functools
 import numpy as np
 
 from ros_3d_bb.core.error_text import cause
-from ros_3d_bb.detection.batches import BGR, RGB, batch_of
-from ros_3d_bb.detection.network_detector import MAX_INPUT_PX, Resize
+from ros_3d_bb.detection.network_detector import BGR, MAX_INPUT_PX, RGB, Resize, batch_of
 from ros_3d_bb.detection.onnx.heads import HEADS, layout_of
 from ros_3d_bb.detection.onnx.model_settings import MAX_STRIDE, ModelSettings, read_settings
-from ros_3d_bb.detection.onnx.session import session_of
 from ros_3d_bb.detection.weights import MAX_CLASSES, WeightsError, class_names
 
 INSTALL = ('ONNX Runtime is not installed; install it with "pip3 install onnxruntime" ("onnxruntime<1.11" on Ubuntu '
            '18.04 and 20.04, see doc/installing.md)')
+CPU, CUDA = 'CPUExecutionProvider', 'CUDAExecutionProvider'
 DTYPES = {'tensor(float)': np.float32, 'tensor(float16)': np.float16, 'tensor(uint8)': np.uint8}
 MAX_OUTPUT_BYTES = 2 ** 28
 MAX_METADATA = 10 ** 6  # characters
@@ -94,15 +93,10 @@ def _preprocessing(dtype, head, settings):
     if dtype == np.uint8:
         if settings.mean or settings.std:
             raise ValueError('its input is uint8, to which mean and std of the YAML file do not apply')
-        return functools.partial(_uint8_batch_of, order=order)
+        return functools.partial(batch_of, order=order, std=(1.0, 1.0, 1.0), dtype=dtype)
     step = 1 if color == head.color else -1
     return functools.partial(batch_of, order=order, mean=tuple(settings.mean or head.mean[::step]),
                              std=tuple(settings.std or head.std[::step]), dtype=dtype)
-
-
-def _uint8_batch_of(image, order=RGB):
-    """Batch (1, 3, height, width) of an RGB image, uint8, with the channels in the given order."""
-    return np.ascontiguousarray(image.transpose(2, 0, 1)[list(order)][None])
 
 
 def _input_layout(shape):
@@ -156,3 +150,31 @@ def _signature(session):
     known = '; '.join('%s %s' % (name, head.shape) for name, head in HEADS.items())
     return '. Inputs: %s. Outputs: %s. Known heads: %s. See doc/onnx.md' % (
         tuple(ascii(text[:MAX_LIST_LENGTH])[1:-1] for text in lists) + (known,))
+
+
+def gpus_are_supported():
+    """Whether the installed ONNX Runtime has the CUDA provider (package onnxruntime-gpu); False if none is there."""
+    try:
+        import onnxruntime
+    except ImportError:
+        return False
+    return CUDA in onnxruntime.get_available_providers()
+
+
+def session_of(model, threads, gpu=None):
+    """Create an onnxruntime.InferenceSession, from a path or from bytes, whose waiting threads sleep.
+
+    By default they spin, which takes a core from other nodes, and doubles the inference time if two share a free core.
+    With `gpu`, the number of a GPU, the network runs there. Raises ValueError if ONNX Runtime cannot use it.
+    """
+    import onnxruntime
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads, options.inter_op_num_threads = threads, 1
+    options.log_severity_level = 4
+    options.add_session_config_entry('session.intra_op.allow_spinning', '0')
+    if gpu is None:
+        return onnxruntime.InferenceSession(model, options, providers=[CPU])
+    session = onnxruntime.InferenceSession(model, options, providers=[(CUDA, {'device_id': gpu}), CPU])
+    if session.get_providers()[0] != CUDA:
+        raise ValueError('ONNX Runtime cannot use the GPU %d; its log names the missing library' % gpu)
+    return session

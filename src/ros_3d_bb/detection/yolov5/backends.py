@@ -13,8 +13,7 @@ import numpy as np
 
 from ros_3d_bb.core.params import Param, check, parameters
 from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetector
-from ros_3d_bb.detection.onnx.onnx_model import OnnxModel
-from ros_3d_bb.detection.onnx.session import gpus_are_supported
+from ros_3d_bb.detection.onnx.onnx_model import OnnxModel, gpus_are_supported
 from ros_3d_bb.detection.weights import WeightsError
 from ros_3d_bb.detection.yolov5.onnx_backend import OnnxUnusable, export_folder, open_exported
 
@@ -46,19 +45,8 @@ class RuntimeParams(NamedTuple):
 def open_detector(weights, detection=DetectionParams(), running=RuntimeParams(), warn=warnings.warn):
     """Open a network as the nodes do, and return it as a `network_detector.NetworkDetector`.
 
-    Parameters
-    ----------
-    weights : str
-        Path of the checkpoint or exported network.
-    detection : network_detector.DetectionParams
-    running : RuntimeParams
-    warn : callable
-        Called with the text of each warning.
-
-    Raises
-    ------
-    ValueError
-        If no weights are given or the network cannot be used.
+    `weights` is the path of the checkpoint or exported network, and `warn` is called with the text of each warning.
+    Raises ValueError if no weights are given or the network cannot be used.
     """
     if not weights:
         raise ValueError('no weights given; set ~weights (launch argument weights:=) to the path of a YOLOv5 '

@@ -6,6 +6,7 @@ Images are (batch, 3, height, width), RGB, 0..1; height and width multiples of `
 """
 import math
 
+import numpy as np
 import torch
 from torch import nn
 
@@ -109,34 +110,24 @@ class Concat(nn.Module):
 
 
 class Detect(nn.Module):
-    """Output layer: boxes and scores of each cell, anchor and scale.
+    """Output layer: the heads, one for each scale, see `predictions.decode_heads`.
 
     `anchors` (scales, anchors per scale, 2), width and height in cells, are loaded with the weights.
     """
 
     def __init__(self, class_count, anchor_count, in_channels, strides):
         super(Detect, self).__init__()
-        self.columns, self.anchor_count = class_count + 5, anchor_count  # numbers, which torch 1.7 exports
         self.strides = strides
-        self.m = nn.ModuleList([nn.Conv2d(channels, anchor_count * self.columns, 1) for channels in in_channels])
+        self.m = nn.ModuleList([nn.Conv2d(channels, anchor_count * (class_count + 5), 1) for channels in in_channels])
         self.register_buffer('anchors', torch.zeros(len(in_channels), anchor_count, 2))
 
-    def forward(self, inputs):
-        """Predictions (batch, rows, 5 + classes): x, y, width, height in pixels, objectness, class scores."""
-        return torch.cat([self._decode(scale, x) for scale, x in enumerate(inputs)], 1)
+    @property
+    def anchors_px(self):
+        """Width and height of the anchors in pixels, as an array (scales, anchors per scale, 2)."""
+        return self.anchors.float().cpu().numpy() * np.reshape(self.strides, (-1, 1, 1))
 
-    def _decode(self, scale, x):
-        stride, anchors = self.strides[scale], self.anchors[scale]
-        y = self.m[scale](x).float()  # half precision would round x and y of boxes to whole pixels
-        batch, _, height, width = y.shape
-        y = y.view(batch, self.anchor_count, self.columns, height, width).permute(0, 1, 3, 4, 2).sigmoid()
-        column = torch.arange(width, device=y.device, dtype=y.dtype).view(1, 1, 1, width)
-        row = torch.arange(height, device=y.device, dtype=y.dtype).view(1, 1, height, 1)
-        center_x = (y[..., 0] * 2 - 0.5 + column) * stride
-        center_y = (y[..., 1] * 2 - 0.5 + row) * stride
-        size = (y[..., 2:4] * 2) ** 2 * (anchors * stride).view(1, -1, 1, 1, 2)
-        y = torch.cat((center_x.unsqueeze(-1), center_y.unsqueeze(-1), size, y[..., 4:]), -1)
-        return y.view(batch, -1, self.columns)
+    def forward(self, inputs):
+        return [head(x) for head, x in zip(self.m, inputs)]
 
 
 class Network(nn.Module):

@@ -13,8 +13,7 @@ import numpy as np
 
 from ros_3d_bb.core.atomic_file import atomic_write
 from ros_3d_bb.core.error_text import cause
-from ros_3d_bb.detection.onnx.onnx_model import INSTALL
-from ros_3d_bb.detection.onnx.session import session_of
+from ros_3d_bb.detection.onnx.onnx_model import INSTALL, session_of
 from ros_3d_bb.detection.yolov5.checkpoint import unreadable
 from ros_3d_bb.detection.yolov5.onnx_writer import metadata_entry
 from ros_3d_bb.detection.yolov5.predictions import Backend, decode_heads, reference_image

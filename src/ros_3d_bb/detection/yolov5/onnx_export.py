@@ -21,11 +21,10 @@ def export(path, digest):
     """
     network, names = network_of(path)
     detect, stride = network.model[-1], int(network.stride)
-    reference = run(network, reference_image(stride)).numpy()
-    anchors_px = detect.anchors.numpy() * np.reshape(detect.strides, (-1, 1, 1))
+    reference = base64.b64encode(run(network, reference_image(stride), -1).astype('<f4').tobytes()).decode()
     return Exporter().model(network, {'about': json.dumps({
         'checkpoint': digest, 'names': names, 'stride': stride, 'strides': detect.strides,
-        'anchors_px': anchors_px.tolist(), 'reference': base64.b64encode(reference.astype('<f4').tobytes()).decode()})})
+        'anchors_px': detect.anchors_px.tolist(), 'reference': reference})})
 
 
 class Exporter(object):

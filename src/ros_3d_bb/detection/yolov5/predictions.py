@@ -6,7 +6,7 @@ network, one per scale, contain the same predictions before decoding.
 import numpy as np
 
 from ros_3d_bb.detection.network_detector import Resize
-from ros_3d_bb.detection.onnx.decoders import decode_rows
+from ros_3d_bb.detection.onnx.decoders import decode_rows, sigmoid
 
 
 class Backend(object):
@@ -43,9 +43,9 @@ def predictions(output):
 def decode_heads(heads, anchors_px, strides, min_objectness):
     """Predictions of the heads of a network, without those whose objectness is not above `min_objectness`.
 
-    For each scale there is a head (1, anchors * (5 + classes), lines, columns), float32, before the sigmoid; the
-    width and height of its anchors in pixels, (anchors, 2); and its stride, the pixels per cell. Predictions are
-    ordered by scale, anchor, line and column as in YOLOv5.
+    For each scale there is a head (1, anchors * (5 + classes), lines, columns), float32 or float16, before the sigmoid;
+    the width and height of its anchors in pixels, (anchors, 2); and its stride, the pixels per cell. Predictions are
+    float32, ordered by scale, anchor, line and column as in YOLOv5.
     """
     with np.errstate(divide='ignore'):
         min_logit = np.log(np.clip(min_objectness, 0, 1) / np.float64(1 - np.clip(min_objectness, 0, 1)))
@@ -55,8 +55,7 @@ def decode_heads(heads, anchors_px, strides, min_objectness):
 def _decode_head(head, anchors_px, stride, min_logit):
     values = head.reshape((len(anchors_px), -1) + head.shape[2:])
     anchor, line, column = np.nonzero(values[:, 4] > min_logit)
-    with np.errstate(over='ignore'):  # for large negative values the result is 0
-        rows = 1 / (1 + np.exp(-values[anchor, :, line, column]))
+    rows = sigmoid(values[anchor, :, line, column].astype(np.float32))
     rows[:, :2] = (rows[:, :2] * 2 - 0.5 + np.stack((column, line), axis=1)) * stride
     rows[:, 2:4] = (rows[:, 2:4] * 2) ** 2 * anchors_px[anchor]
     return rows

@@ -5,11 +5,11 @@ import numpy as np
 import torch
 
 from ros_3d_bb.core.error_text import cause
-from ros_3d_bb.detection.batches import batch_of
+from ros_3d_bb.detection.network_detector import batch_of
 from ros_3d_bb.detection.weights import WeightsError, class_names
 from ros_3d_bb.detection.yolov5.checkpoint import EXPECTED, read_checkpoint
 from ros_3d_bb.detection.yolov5.network import Network
-from ros_3d_bb.detection.yolov5.predictions import Backend, check_stride, predictions
+from ros_3d_bb.detection.yolov5.predictions import Backend, check_stride, decode_heads, predictions
 
 
 def torch_device(name):
@@ -36,18 +36,19 @@ def network_of(path):
         network.load_state_dict({name: torch.from_numpy(array.astype(np.float32)) for name, array in weights.items()
                                  if not name.endswith('.anchor_grid')})  # a second copy of the anchors in release 5.0
         stride = check_stride(network.stride)
-        run(network.fuse(), np.zeros((stride, stride, 3), np.uint8))
+        run(network.fuse(), np.zeros((stride, stride, 3), np.uint8), 0)
     except Exception as error:  # an invalid layout can raise any exception
         raise WeightsError('weights %s: the network cannot be built from its yaml (%s); %s'
                            % (path, cause(error), EXPECTED))
     return network, names
 
 
-def run(network, image):
-    """Predictions of a network for an image (height, width, 3), uint8, as a tensor on the network's device."""
-    weight = next(network.parameters())
+def run(network, image, min_objectness):
+    """Predictions of a network for an image, see `predictions.Backend`."""
+    detect, weight = network.model[-1], next(network.parameters())
     with torch.no_grad():
-        return network(torch.from_numpy(batch_of(image)).to(weight.device, weight.dtype))[0]
+        heads = network(torch.from_numpy(batch_of(image)).to(weight.device, weight.dtype))
+    return decode_heads([head.cpu().numpy() for head in heads], detect.anchors_px, detect.strides, min_objectness)
 
 
 class TorchRuntime(Backend):
@@ -61,8 +62,7 @@ class TorchRuntime(Backend):
         self.description = description_of(device, threads)
 
     def __call__(self, image, min_objectness):
-        rows = run(self._network, image)
-        return rows[rows[:, 4] > min_objectness].cpu().numpy()
+        return run(self._network, image, min_objectness)
 
 
 class TorchScriptRuntime(Backend):

@@ -49,16 +49,13 @@ class DetectorWorker(object):
 
     def offer(self, *images):
         """Detect objects in these images, of which the first is the colour image, unless newer ones arrive first."""
-        if not self._enabled:
-            self._diagnostics.count('images while paused')
-            return
         if self._waits_since_s is None:
             self._waits_since_s = time.monotonic()
         if self._worker.offer(images):
             self._diagnostics.count('images skipped for a newer one')
 
     def _work(self, images):
-        if not self._enabled:  # the detector was paused after the images arrived
+        if not self._enabled:
             self._diagnostics.count('images while paused')
             return
         try:

@@ -12,8 +12,7 @@ from ros_3d_bb.core.event_counter import MOST_LAGS, EventCounter
 from ros_3d_bb.core.params import with_places
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.common.master import is_ending
-from ros_3d_bb.nodes.common.part import Part
-from ros_3d_bb.nodes.common.startup import launch_places
+from ros_3d_bb.nodes.common.startup import Part, launch_places
 from ros_3d_bb.nodes.common.subscribers import InputMonitor
 
 PERIOD_S = 1.0

@@ -76,10 +76,8 @@ class RobotTracks(LatestTracks):
     ----------
     ros_3d_bb/tracks : ros_3d_bb/TrackedObjectArray
         Tracks.
-    /tf : tf2_msgs/TFMessage
+    /tf,/tf_static : tf2_msgs/TFMessage
         Pose of the robot in the frame of the tracks.
-    /tf_static : tf2_msgs/TFMessage
-        As /tf.
     """
 
     def __init__(self, diagnostics, params, on_tracks=lambda _tracks: None):

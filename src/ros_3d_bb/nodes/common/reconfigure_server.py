@@ -1,6 +1,5 @@
 """Server for changing the parameters of a running node with the dynamic_reconfigure tools."""
 import threading
-from collections import OrderedDict
 
 import rospy
 from dynamic_reconfigure.encoding import decode_config, encode_config, get_tree
@@ -23,7 +22,7 @@ class ReconfigureServer(object):
 
     `params` are all parameters of the node, as returned by `startup.read_params`. `apply` is called with the changed
     parameters, in the same order. It raises ValueError without changing anything if they are invalid. `namespace` is
-    that of the node, see `part.Part`.
+    that of the node, see `startup.Part`.
 
     Publishes
     ---------
@@ -94,7 +93,7 @@ class ReconfigureServer(object):
 
 def live_in(kinds):
     """Return the live parameters of NamedTuple types, {name: Param}."""
-    return OrderedDict((name, param) for name, param in table_of(kinds).items() if param.live)
+    return {name: param for name, param in table_of(kinds).items() if param.live}
 
 
 def _description_of(live):

@@ -24,11 +24,9 @@ class RgbdInputs(object):
         between both cameras in tf.
     camera/color/camera_info : sensor_msgs/CameraInfo
         Calibration of the colour camera.
-    /tf : tf2_msgs/TFMessage
+    /tf,/tf_static : tf2_msgs/TFMessage
         Transform from ~floor_frame to the camera, for its tilt and the floor, and between the cameras for raw depth.
         Not used if ~floor_frame is empty and depth is aligned.
-    /tf_static : tf2_msgs/TFMessage
-        As /tf.
     """
 
     def __init__(self, params, diagnostics, on_match, transforms, **of_source):
@@ -41,19 +39,16 @@ class RgbdInputs(object):
         topics = rospy.resolve_name(depth_topic), depth_info_topic, rospy.resolve_name(INFO_TOPICS[0])
         self.source = RgbdSource(params, diagnostics, on_match, transforms, topics, **of_source)
         # Depth images are cached until their boxes arrive, so the subscriber queues must not drop any.
-        subscribe(depth_topic, Image, self._on_depth, KEPT_AT_ONCE)
-        subscribe_camera_info(INFO_TOPICS[0], COLOR_INFO_IMAGES[params.depth], self._on_camera_info)
+        subscribe(depth_topic, Image, self.receiver('depth images', self.source.add_depth), KEPT_AT_ONCE)
+        subscribe_camera_info(INFO_TOPICS[0], COLOR_INFO_IMAGES[params.depth],
+                              self.receiver('camera_info', self.source.add_camera_info))
         if is_raw:
-            subscribe_camera_info(depth_info_topic, depth_topic, self._on_depth_camera_info, 1)
+            subscribe_camera_info(depth_info_topic, depth_topic,
+                                  self.receiver('camera_info of depth', self.source.add_depth_camera_info), 1)
 
-    def _on_depth(self, message):
-        with self._diagnostics.receiving('depth images'), self.lock:
-            self.source.add_depth(message, arrival_clock_ns())
-
-    def _on_camera_info(self, message):
-        with self._diagnostics.receiving('camera_info'), self.lock:
-            self.source.add_camera_info(message, arrival_clock_ns())
-
-    def _on_depth_camera_info(self, message):
-        with self._diagnostics.receiving('camera_info of depth'), self.lock:
-            self.source.add_depth_camera_info(message)
+    def receiver(self, inputs, add):
+        """Return a callback that passes a message, with its arrival time, to an `add_` method of the source."""
+        def on_message(message):
+            with self._diagnostics.receiving(inputs), self.lock:
+                add(message, arrival_clock_ns())
+        return on_message

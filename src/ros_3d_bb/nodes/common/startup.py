@@ -1,7 +1,8 @@
-"""Start-up of a node: read its parameters, create it, report errors, and wait for subscribers."""
+"""Start-up of a node, alone or beside others: read its parameters, create it, report errors, wait for subscribers."""
 import ctypes
 import sys
 import time
+from typing import Any, Callable, NamedTuple, Optional
 
 import rospy
 
@@ -18,6 +19,27 @@ SENDING_S = 1.0  # from the last message to the exit: rospy drops messages that 
 LONGEST_WAIT_S = 60.0  # after this time, missing subscribers are an error
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # glibc's malloc.h
 LARGEST_BYTES = 32 * 2 ** 20  # limit of glibc
+
+
+class Part(NamedTuple):
+    """How a node is part of its process: alone by default, or beside the others in people_node.
+
+    Parameters, services and diagnostics have the names of a node of its own, whose private namespace is `namespace`.
+    `transforms` are shared; None: the node has its own. `next_stage` is called with each result after it is published.
+    `subscribes` states whether the node subscribes to the results of the stage before, and `monitors` whether its
+    diagnostics report on the inputs and subscribers of the process.
+    """
+
+    namespace: str = '~'
+    transforms: Any = None
+    next_stage: Optional[Callable] = None
+    subscribes: bool = True
+    monitors: bool = True
+
+    @property
+    def node_name(self):
+        """Global name of the node, which for a part in people_node is not that of the process."""
+        return rospy.get_name() if self.namespace == '~' else rospy.resolve_name(self.namespace.rstrip('/'))
 
 
 def read_params(*kinds, namespace='~'):

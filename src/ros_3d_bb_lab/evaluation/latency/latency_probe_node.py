@@ -15,7 +15,7 @@ from visualization_msgs.msg import MarkerArray
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
-from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.startup import read_params
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
 from ros_3d_bb_lab.evaluation.latency.latency_result import STAGES
 
@@ -116,8 +116,3 @@ def usage_of(pid):
         return None
     utime, stime, rss_pages = (int(fields[number - 3]) for number in (14, 15, 24))  # numbered as in proc(5)
     return (utime + stime) / os.sysconf('SC_CLK_TCK'), rss_pages * os.sysconf('SC_PAGE_SIZE') / 1e6
-
-
-def main():
-    """Run the node until the measurement is complete."""
-    run_node('latency_probe_node', LatencyProbeNode, LatencyProbeNode.measure)

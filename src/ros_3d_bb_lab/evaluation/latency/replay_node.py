@@ -11,7 +11,7 @@ from ros_3d_bb.conversions.camera_msgs import TYPES
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, with_stamp
 from ros_3d_bb.core.params import SET_BY_LAUNCH, Param, parameters
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
-from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.startup import read_params
 
 
 @parameters()
@@ -55,8 +55,3 @@ class ReplayNode(object):
                     self._pubs[topic].publish(with_stamp(message, stamp))
                 self._diagnostics.count('images')
                 self._diagnostics.record_latency(stamp)
-
-
-def main():
-    """Run the node."""
-    run_node('replay_node', ReplayNode, ReplayNode.run)

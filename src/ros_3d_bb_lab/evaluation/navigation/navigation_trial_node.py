@@ -20,7 +20,7 @@ from ros_3d_bb.conversions.planner_msgs import points_to_msg
 from ros_3d_bb.core.params import SET_BY_LAUNCH, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
-from ros_3d_bb.nodes.common.startup import read_params, run_node
+from ros_3d_bb.nodes.common.startup import read_params
 from ros_3d_bb_lab.evaluation.navigation.trial_result import (CELL_M, SHINS_M, Pace, VisiblePeople, distance_m,
                                                               occupancy, points_of, stops, was_driving)
 from ros_3d_bb_lab.simulation.laser import FIELD_OF_VIEW, planar_pose, scan_ranges
@@ -202,8 +202,3 @@ def goal_message(params, stamp):
     """Goal of a trial in the map, facing along x."""
     pose = Pose(Point(params.goal_x, params.goal_y, 0), Quaternion(0, 0, 0, 1))
     return PoseStamped(Header(stamp=stamp, frame_id=MAP_FRAME), pose)
-
-
-def main():
-    """Run the node until the trial is over."""
-    run_node('navigation_trial_node', NavigationTrialNode, NavigationTrialNode.run)

@@ -18,7 +18,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.master import is_ending
-from ros_3d_bb.nodes.common.startup import SENDING_S, read_params, run_node, wait_for_subscribers
+from ros_3d_bb.nodes.common.startup import SENDING_S, read_params, wait_for_subscribers
 from ros_3d_bb_lab.simulation.ros.driven_robot import QUEUE_SIZE, DrivenRobot, robot_transforms
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import TRUTH_TOPIC, boxes_message, simulated_messages
 from ros_3d_bb_lab.simulation.scenario import read_scenario, with_overrides
@@ -224,8 +224,3 @@ def _scenario(params):
     except OSError as error:
         raise ValueError('the scenario cannot be read: %s; an absolute path expected' % error)
     return with_overrides(scenario, params.rate or None, None if params.seed < 0 else params.seed)
-
-
-def main():
-    """Run the node."""
-    run_node('simulator_node', SimulatorNode, SimulatorNode.run)
