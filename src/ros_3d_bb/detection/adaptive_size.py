@@ -17,6 +17,11 @@ class AdaptiveSize(object):
 
     The size is reduced after one window of detections that are too slow, and increased after several in which there was
     enough time, so that it does not follow short loads back and forth.
+
+    Attributes
+    ----------
+    size : int
+        The longer side of the network's input, pixels.
     """
 
     def __init__(self):
@@ -25,7 +30,6 @@ class AdaptiveSize(object):
 
     @property
     def size(self):
-        """The longer side of the network's input, pixels."""
         return SIZES[self._index]
 
     def add_image(self, stamp_ns):

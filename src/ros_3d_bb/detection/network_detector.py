@@ -64,14 +64,20 @@ class Placement(NamedTuple):
 class NetworkDetector(object):
     """Detector that runs a network.
 
-    `network` is a backend of `detection.yolov5.backends` or an `onnx.onnx_model.OnnxModel`. Its method `candidates`
-    takes an RGB image (height, width, 3), uint8, and a confidence, and returns the Detections above it in pixels of
-    this image, in any order. Its attributes are `names`, the class names; `stride`, of which height and width must be
-    multiples; `input_hw`, the only (height, width) that it accepts, or None if it accepts any; `resize`, a `Resize`;
-    `suppressed`, whether it suppresses overlapping boxes itself; and `description`, a text for logs. `params` are
-    DetectionParams.
+    Parameters
+    ----------
+    network
+        A backend of `detection.yolov5.backends` or an `onnx.onnx_model.OnnxModel`. Its method `candidates` takes an
+        RGB image (height, width, 3), uint8, and a confidence, and returns the Detections above it in pixels of this
+        image, in any order. Its attributes are `names`, the class names; `stride`, of which height and width must be
+        multiples; `input_hw`, the only (height, width) that it accepts, or None if it accepts any; `resize`, a
+        `Resize`; `suppressed`, whether it suppresses overlapping boxes itself; and `description`, a text for logs.
+    params : DetectionParams
 
-    Raises ValueError if there is no class to detect, or the model does not have one of the classes.
+    Raises
+    ------
+    ValueError
+        If there is no class to detect, or the model does not have one of the classes.
     """
 
     def __init__(self, network, params=DetectionParams()):

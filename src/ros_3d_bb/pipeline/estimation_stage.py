@@ -151,8 +151,11 @@ class ScaleCheck(object):
     def factor(self, boxes):
         """Add the `Box3D`s of one image, plausible or not.
 
-        Returns the factor by which depth must be multiplied to give people the usual height; a common factor if one is
-        near. None if the heights are possible or too few. After a factor, new people are collected.
+        Returns
+        -------
+        float or None
+            Factor by which depth must be multiplied to give people the usual height; a common factor if one is near.
+            None if the heights are possible or too few. After a factor, new people are collected.
         """
         self._heights_m.extend(float(box.size_m[1]) for box in boxes if _shows_standing_person(box))
         if len(self._heights_m) < LATEST_PEOPLE:

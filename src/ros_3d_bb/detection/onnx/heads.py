@@ -54,11 +54,23 @@ class Layout(NamedTuple):
 
 
 def layout_of(outputs, input_hw, metadata, head='', strides=(), names=()):
-    """Recognise a network by its outputs (list of ndarray) for any image with this height and width. Returns its
-    Layout.
+    """Recognise a network by its outputs. Returns its Layout.
 
-    `metadata` are those of the file, {key: text}. The name of the head, the strides of its grid and the names of its
-    classes are optional. Raises ValueError if the outputs are not those of a known head, or not of what is given.
+    Parameters
+    ----------
+    outputs : list of ndarray
+        Outputs for any image.
+    input_hw : tuple of int
+        Height and width of that image.
+    metadata : dict
+        Metadata of the file, {key: text}.
+    head, strides, names : optional
+        Name of the head, strides of its grid and names of its classes, where they are given.
+
+    Raises
+    ------
+    ValueError
+        If the outputs are not those of a known head, or not of what is given.
     """
     if metadata.get('task', 'detect') not in TASKS:
         raise ValueError('its task is %.40r; %s expected' % (metadata['task'], ', '.join(TASKS)))

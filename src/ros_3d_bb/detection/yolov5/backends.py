@@ -45,8 +45,19 @@ class RuntimeParams(NamedTuple):
 def open_detector(weights, detection=DetectionParams(), running=RuntimeParams(), warn=warnings.warn):
     """Open a network as the nodes do, and return it as a `network_detector.NetworkDetector`.
 
-    `weights` is the path of the checkpoint or exported network, and `warn` is called with the text of each warning.
-    Raises ValueError if no weights are given or the network cannot be used.
+    Parameters
+    ----------
+    weights : str
+        Path of the checkpoint or exported network.
+    detection : network_detector.DetectionParams
+    running : RuntimeParams
+    warn : callable
+        Called with the text of each warning.
+
+    Raises
+    ------
+    ValueError
+        If no weights are given or the network cannot be used.
     """
     if not weights:
         raise ValueError('no weights given; set ~weights (launch argument weights:=) to the path of a YOLOv5 '
