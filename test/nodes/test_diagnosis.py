@@ -23,7 +23,7 @@ from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.doctor import graph_findings
 from ros_3d_bb_lab.evaluation.launching import free_port, running_roslaunch
-from support.ros import Recorder, header_at, wait_until
+from support.ros import Recorder, header_at, launched, wait_until
 
 COLOR, DEPTH = 'camera/color/image_raw', 'camera/aligned_depth_to_color/image_raw'
 INFO, DEPTH_INFO, BOXES = 'camera/color/camera_info', 'camera/aligned_depth_to_color/camera_info', 'yolo_bounding_box'
@@ -111,7 +111,8 @@ def check_output(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def rig():
-    return Rig()
+    with launched('bbox3d.launch'), launched('tracker.launch'):
+        yield Rig()
 
 
 @pytest.fixture

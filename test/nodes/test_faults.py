@@ -19,9 +19,10 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb_lab.evaluation.latency.benchmark import cpu_load
 from support.processes import hanging, killed_and_back, never_reading
-from support.ros import wait_until
+from support.ros import launched, wait_until
 from support.stage import PERIOD_NS, Stage
 
+USE_SIM_TIME = True
 NODES = '/depth_detector_node', '/bbox3d_node', '/tracker_node', '/planner_bridge_node'
 OUTPUTS = [('/depth_detector_node', '/yolo_bounding_box', Int32MultiArray),
            ('/depth_detector_node', '/yolo_result_out', Image), ('/depth_detector_node', '/rosout', Log),
@@ -35,8 +36,9 @@ OUTPUTS = [('/depth_detector_node', '/yolo_bounding_box', Int32MultiArray),
 
 @pytest.fixture(scope='module')
 def pipeline_stage():
-    stage = Stage()
-    yield stage
+    with launched('pipeline.launch', 'detector:=depth', 'planner:=costmap', 'respawn:=true', 'single_process:=false'):
+        stage = Stage()
+        yield stage
     print('\n' + '\n'.join(stage.rows))
 
 
