@@ -29,8 +29,6 @@ def pytest_addoption(parser):
     parser.addoption('--leave-out', action='store_true',
                      help='skip tests that need packages of requirements.txt, or programs, that are not installed')
     parser.addoption('--long', action='store_true', help='run the tests with the marker long, and only these')
-    parser.addoption('--minutes', type=float, default=30.0, help='duration of the soak')
-    parser.addoption('--seed', type=int, default=1, help='seed of the soak')
 
 
 def pytest_configure(config):

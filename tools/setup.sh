@@ -3,10 +3,10 @@
 
 apt_packages=(
   build-essential catkin catkin-lint cmake libdynamic-reconfigure-config-init-mutex-dev libgeometry-msgs-dev
-  libgl1-mesa-dri libroscpp-dev libsensor-msgs-dev libstd-msgs-dev python3-actionlib-msgs
+  libgl1-mesa-dri libroscpp-dev librostest-dev libsensor-msgs-dev libstd-msgs-dev python3-actionlib-msgs
   python3-diagnostic-msgs python3-dynamic-reconfigure python3-genpy python3-geometry-msgs python3-matplotlib
   python3-nav-msgs python3-numpy python3-opencv python3-pyqt5 python3-rosbag python3-rosgraph python3-rosgraph-msgs
-  python3-roslib python3-rospkg python3-rospy python3-scipy python3-sensor-msgs python3-setuptools
+  python3-roslib python3-rospkg python3-rospy python3-rostest python3-scipy python3-sensor-msgs python3-setuptools
   python3-std-msgs python3-std-srvs python3-tf2-msgs python3-tf2-ros python3-venv python3-visualization-msgs
   python3-yaml ros-core ros-geometry-msgs ros-message-generation ros-message-runtime ros-sensor-msgs ros-std-msgs
   rosbash rviz tf2-tools xauth xdotool xvfb)

@@ -15,8 +15,9 @@ run_tests() {
       "$venv/bin/python3" -m pytest -q -n 2 --dist loadfile -m 'not slow' "${pytest_options[@]}" test/unit ;;
     --long)
       [ $# -eq 1 ] || fail "test --long takes no further arguments, not '$2'"
-      pytest_options+=(--long --minutes=2)
-      run_some_tests "$here/test/workspace" "$here/test/nodes/test_soak.py" ;;
+      pytest_options+=(--long)
+      run_some_tests "$here/test/workspace"
+      rostest "$here/test/nodes/soak.test" minutes:=2 ;;
     --platform) test_on_platform "${@:2}" ;;
     *) run_some_tests "$@" ;;
   esac
@@ -53,7 +54,7 @@ test_on_platform() {  # NAME [--fast | -k EXPR | PATH ...]
   esac
 }
 
-# Test files and folders; with -k EXPR only, the unit and workspace tests.
+# Test files and folders by pytest, .test files by rostest; with -k EXPR only, the unit and workspace tests.
 run_some_tests() {
   local paths=() expression=() path
   while [ $# -gt 0 ]; do
@@ -77,9 +78,10 @@ run_some_tests() {
   local status=0 by_pytest=()
   for path in "${paths[@]}"; do
     case $path in
-      "$here"/test/nodes) fail "each file of '$path' needs a process of its own: test a file" ;;
-      "$here"/test/nodes/*) "$venv/bin/python3" -m pytest -q -s "${pytest_options[@]}" "$path" "${expression[@]}" ||
-        status=$? ;;
+      "$here"/test/nodes/*.test)
+        [ ${#expression[@]} -eq 0 ] || fail "-k does not apply to '$path', which runs as a whole"
+        rostest "$path" || status=$? ;;
+      "$here"/test/nodes*) fail "'$path' needs a master: test its .test file" ;;
       "$here"/test/gazebo*) without_screen "$venv/bin/python3" -m pytest -q "$path" "${expression[@]}" || status=$? ;;
       *) by_pytest+=("$path") ;;
     esac

@@ -4,6 +4,7 @@ Time is simulated: a slow computer needs longer, but sees the same.
 """
 import bisect
 import contextlib
+import subprocess
 
 import numpy as np
 import pytest
@@ -12,8 +13,9 @@ from gazebo_msgs.msg import ModelStates
 from geometry_msgs.msg import PoseStamped
 
 from ros_3d_bb.msg import TrackedObjectArray
+from ros_3d_bb_lab.evaluation.launching import running
 from support.processes import processes_naming
-from support.ros import Recorder, launched, own_master, wait_until
+from support.ros import Recorder, launched, wait_until
 
 FPS = 10
 PATIENCE_S = 600.0  # wall-clock time
@@ -62,5 +64,7 @@ def start(weights):
             assert nodes.poll() is None, 'roslaunch has exited'
             yield world
         wait_until(lambda: not processes_naming('libgazebo_ros_api_plugin'), 'the end of Gazebo', PATIENCE_S)
-    with own_master(use_sim_time=True):
+    with running(['roscore']):
+        subprocess.check_call('until rosparam set use_sim_time true; do sleep 1; done', shell=True)
+        rospy.init_node('test_gazebo')
         yield started

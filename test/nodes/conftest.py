@@ -1,13 +1,8 @@
-"""The tests of nodes are a node themselves, on a master of their own. Each file needs a process of its own, therefore.
-
-With `USE_SIM_TIME`, a file has simulated time.
-"""
+"""The tests of nodes are a node themselves, on the master of rostest, which gives it its name."""
 import pytest
-
-from support.ros import own_master
+import rospy
 
 
 @pytest.fixture(scope='session', autouse=True)
-def ros_node(request):
-    with own_master(getattr(request.session.items[0].module, 'USE_SIM_TIME', False)):
-        yield
+def ros_node():
+    rospy.init_node('test')

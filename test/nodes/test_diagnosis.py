@@ -20,7 +20,7 @@ from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC as BOXES
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.doctor import graph_findings
 from ros_3d_bb_lab.evaluation.launching import free_port, running_roslaunch
-from support.ros import Recorder, launched, wait_until
+from support.ros import Recorder, wait_until
 
 INFO, KINDS = INFO_TOPICS[0], dict(TYPES, **{BOXES: Int32MultiArray})
 PERIOD_S = 0.1
@@ -100,8 +100,7 @@ def check_output(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def rig():
-    with launched('bbox3d.launch'), launched('tracker.launch'):
-        yield Rig()
+    return Rig()
 
 
 @pytest.fixture

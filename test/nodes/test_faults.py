@@ -13,10 +13,9 @@ from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOP
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb_lab.evaluation.latency.benchmark import cpu_load
 from support.processes import hanging, killed_and_back, never_reading
-from support.ros import launched, wait_until
+from support.ros import wait_until
 from support.stage import PERIOD_NS, Stage
 
-USE_SIM_TIME = True
 NODES = '/depth_detector_node', '/bbox3d_node', '/tracker_node', '/planner_bridge_node'
 OUTPUTS = {'/depth_detector_node': ['/yolo_bounding_box', '/yolo_result_out', '/rosout'],
            '/bbox3d_node': ['/ros_3d_bb/bb_3d', '/ros_3d_bb/color', '/ros_3d_bb/depth'],
@@ -26,9 +25,8 @@ OUTPUTS = {'/depth_detector_node': ['/yolo_bounding_box', '/yolo_result_out', '/
 
 @pytest.fixture(scope='module')
 def pipeline_stage():
-    with launched('pipeline.launch', 'detector:=depth', 'planner:=costmap', 'respawn:=true', 'single_process:=false'):
-        stage = Stage()
-        yield stage
+    stage = Stage()
+    yield stage
     print('\n' + '\n'.join(stage.rows))
 
 

@@ -2,6 +2,7 @@
 import contextlib
 import os
 import signal
+import subprocess
 import time
 from unittest import mock
 
@@ -18,7 +19,7 @@ from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.common.master import Registration, on_new_master
 from ros_3d_bb.nodes.viewer_node import Label
 from ros_3d_bb.sessions.session_reader import read_session
-from ros_3d_bb_lab.evaluation.launching import free_port, running
+from ros_3d_bb_lab.evaluation.launching import free_port
 from ros_3d_bb_lab.evaluation.latency.latency_probe_node import pid_of
 from support.processes import killed_and_back
 from support.ros import TIMEOUT_S, Recorder, launched, wait_until
@@ -29,16 +30,18 @@ NODES = '/people_node', '/planner_bridge_node'
 
 @pytest.fixture(scope='session', autouse=True)
 def ros_node():
-    """Without the master of the other tests."""
+    """Without the master of rostest."""
 
 
 @contextlib.contextmanager
 def master(port):
-    """It is killed at the end."""
-    with running(['rosmaster', '--core', '-p', str(port)]) as process:
+    process = subprocess.Popen(['rosmaster', '--core', '-p', str(port)])
+    try:
         wait_until(rosgraph.is_master_online, 'a master')
         yield process
+    finally:
         process.kill()
+        process.wait()
 
 
 def set_label(label):
@@ -55,12 +58,12 @@ def test_the_master_is_killed_and_restarted(tmp_path, monkeypatch):
     """Connected nodes continue meanwhile; then they register again, so that later nodes find them."""
     port = free_port()
     monkeypatch.setenv('ROS_MASTER_URI', 'http://localhost:%d' % port)
-    with contextlib.ExitStack() as processes:
+    with contextlib.ExitStack() as running:
         with master(port) as first:
             rospy.set_param('/use_sim_time', True)
             rospy.init_node('test_master')
             Registration()  # this process has to be found again, too
-            processes.enter_context(launched('pipeline.launch', 'detector:=depth', 'planner:=costmap', 'respawn:=true'))
+            running.enter_context(launched('pipeline.launch', 'detector:=depth', 'planner:=costmap', 'respawn:=true'))
             label, failing_once = Label(''), mock.Mock(side_effect=[OSError('the network is gone again'), None])
             on_new_master(failing_once)
             rospy.set_param('~label', 'A1')
@@ -69,14 +72,14 @@ def test_the_master_is_killed_and_restarted(tmp_path, monkeypatch):
             depth_camera_pub = rospy.Publisher(INFO_TOPICS[1], CameraInfo, queue_size=10)
             rospy.Subscriber(INFO_TOPICS[0], CameraInfo, depth_camera_pub.publish)  # depth is that of colour
             before, pids = stage.recovered('(before the fault)', 60), [pid_of(node) for node in NODES]
-            processes.enter_context(launched('viewer.launch', 'window:=false', 'label:=A1', 'session:=%s' % tmp_path))
+            running.enter_context(launched('viewer.launch', 'window:=false', 'label:=A1', 'session:=%s' % tmp_path))
             rospy.wait_for_service('viewer_node/capture', timeout=20)
             capture = rospy.ServiceProxy('viewer_node/capture', Trigger, persistent=True)
             wait_until(lambda: stage.tries(TIMEOUT_S) and capture().success, 'a measurement')
             Client('tracker_node', timeout=20).update_configuration({'marker_history': 3.0})
             set_label('A2')
             wait_until(lambda: label.from_cache() == 'A2', 'the label that was set')
-            diagnostics = processes.enter_context(Recorder('/diagnostics', DiagnosticArray))
+            diagnostics = running.enter_context(Recorder('/diagnostics', DiagnosticArray))
             wait_for_reports(diagnostics, 'tracker_node', 1)
             first.send_signal(signal.SIGSTOP)
             wait_for_reports(diagnostics, 'tracker_node', 10)  # after 5 s without images it queries the master
@@ -104,5 +107,5 @@ def test_the_master_is_killed_and_restarted(tmp_path, monkeypatch):
             killed_and_back('/people_node', lambda: time.sleep(0.1))
             after = stage.recovered('tracker killed after that')
             assert min(after.values()) > max(before.values())
-            processes.close()
+            running.close()
     print('\n' + '\n'.join(stage.rows))

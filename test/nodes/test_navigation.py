@@ -27,7 +27,6 @@ from support.real_planners import ROOT, planner_environment
 from support.ros import Recorder, header_at, wait_until
 from support.two_cameras import boxes
 
-USE_SIM_TIME = True
 TICK_NS, PERIOD_NS = NS // 100, NS // 10
 CAMERA, BASE_FROM_CAMERA = 'camera_color_optical_frame', transform_from((0.17, 0, 0.2), OPTICAL_ROTATION)
 DRIFT = 0.03, -0.02, 0.02  # of odom in the map: x, y (m/s) and yaw (rad/s)

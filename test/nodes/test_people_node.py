@@ -24,7 +24,7 @@ from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams
 from ros_3d_bb.visualization.markers import MarkerParams
 from support.compressed import compressed
-from support.ros import TIMEOUT_S, Recorder, depth_message, launched, publisher, wait_until
+from support.ros import TIMEOUT_S, Recorder, depth_message, publisher, wait_until
 
 LIVE = {'bbox3d_node': live_in([Bbox3dParams]),
         'depth_detector_node': live_in([DepthDetectorParams, DepthPeopleParams]),
@@ -51,11 +51,10 @@ def test_the_publisher_decides_the_type_of_images():
 
 @pytest.fixture(scope='module')
 def clients():
-    with launched('pipeline.launch', 'detector:=depth', 'single_process:=true'):
-        created = {node: Client(node, timeout=TIMEOUT_S) for node in NODES}
-        yield created
-        for client in created.values():
-            client.close()
+    created = {node: Client(node, timeout=TIMEOUT_S) for node in NODES}
+    yield created
+    for client in created.values():
+        client.close()
 
 
 def current(client):

@@ -8,8 +8,6 @@ from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.sessions.session_reader import read_session
 from support.ros import Recorder, launched
 
-USE_SIM_TIME = True
-
 
 def test_playback_tracks_the_person_in_the_map(session_folder, weights, tmp_path):
     """From the images of a session alone, with the detector.

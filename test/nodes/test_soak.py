@@ -6,12 +6,12 @@ import random
 import time
 
 import numpy as np
-import pytest
+import rospy
 
 import test_faults as faults
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb_lab.evaluation.latency.latency_probe_node import pid_of, usage_of
-from test_faults import USE_SIM_TIME, pipeline_stage, stage  # noqa: F401 (the last two are fixtures)
+from test_faults import pipeline_stage, stage  # noqa: F401 (fixtures)
 
 FAULTS = ([(faults.test_a_node_hangs_and_continues, node) for node in faults.NODES]
           + [(faults.test_the_camera_pauses_for_10_s,), (faults.test_transforms_stop, 1, 0.1, 0),
@@ -23,10 +23,8 @@ FAULTS = ([(faults.test_a_node_hangs_and_continues, node) for node in faults.NOD
 RISE_MB = 100.0  # limit of the rise after the first round: queues of images that a hanging process has not read
 
 
-@pytest.mark.long
-def test_no_process_ends_and_memory_is_flat(stage, pytestconfig):  # noqa: F811
-    source = random.Random(pytestconfig.getoption('--seed'))
-    end_s = time.monotonic() + 60 * pytestconfig.getoption('--minutes')
+def test_no_process_ends_and_memory_is_flat(stage):  # noqa: F811
+    source, end_s = random.Random(rospy.get_param('~seed')), time.monotonic() + 60 * rospy.get_param('~minutes')
     pids, rounds_mb = [pid_of(node) for node in faults.NODES], []
     while time.monotonic() < end_s or len(rounds_mb) < 2:
         for fault, *values in source.sample(FAULTS, len(FAULTS)):

@@ -13,7 +13,7 @@ from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObject, TrackedObjectArray
 from support.people import mounted
-from support.ros import TIMEOUT_S, Recorder, diagnostics_of, header_at, launched, publisher, wait_until
+from support.ros import TIMEOUT_S, Recorder, diagnostics_of, header_at, publisher, wait_until
 from support.two_cameras import boxes
 
 PERIOD, CAMERA = NS // 10, 'camera_color_optical_frame'
@@ -42,8 +42,7 @@ class Rig(object):
 
 @pytest.fixture(scope='module')
 def rig():
-    with launched('tracker.launch', 'map:=static_map'):
-        yield Rig()
+    return Rig()
 
 
 @pytest.fixture

@@ -1,11 +1,8 @@
 """Shared by the tests of nodes: recording topics, and messages of a camera and of a track."""
-import contextlib
-import os
 import subprocess
 import time
 
 import numpy as np
-import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import CameraInfo, Image
@@ -13,11 +10,10 @@ from std_msgs.msg import Header
 
 from ros_3d_bb.conversions.image_msgs import fill_image
 from ros_3d_bb.conversions.perception_msgs import time_from, tracks_to_msg
-from ros_3d_bb_lab.evaluation.latency.latency_probe_node import pid_of
-from ros_3d_bb_lab.evaluation.launching import free_port, running
+from ros_3d_bb_lab.evaluation.launching import running
 from support.tracks import track_at
 
-TIMEOUT_S, STARTING_S = 20.0, 60.0  # the latter for nodes to start
+TIMEOUT_S = 20.0
 
 
 def wait_until(condition, what, timeout_s=TIMEOUT_S):
@@ -26,19 +22,6 @@ def wait_until(condition, what, timeout_s=TIMEOUT_S):
     while not condition():
         assert time.monotonic() < deadline_s and not rospy.is_shutdown(), 'never happened: %s' % what
         time.sleep(0.01)
-
-
-@contextlib.contextmanager
-def own_master(use_sim_time):
-    """This process is a node on a master of its own."""
-    port = free_port()
-    os.environ['ROS_MASTER_URI'] = 'http://localhost:%d' % port
-    with running(['roscore', '-p', str(port)], stdout=subprocess.DEVNULL):
-        wait_until(lambda: rosgraph.is_master_online() and pid_of('/rosout'), 'roscore', STARTING_S)
-        rospy.set_param('/use_sim_time', use_sim_time)
-        rospy.init_node('test')
-        yield
-        rospy.signal_shutdown('the tests are over')
 
 
 def launched(*arguments):
@@ -62,7 +45,7 @@ class Recorder(object):
         self._subscriber = rospy.Subscriber(topic, kind, lambda message: self.messages.append(message),
                                             queue_size=1000, buff_size=2 ** 26)
         if publisher_expected:
-            wait_until(lambda: self.is_connected, 'a publisher on ' + topic, STARTING_S)
+            wait_until(lambda: self.is_connected, 'a publisher on ' + topic)
             time.sleep(0.3)  # the publisher counts a connection a moment later than the subscriber
 
     @property
@@ -94,7 +77,7 @@ class Recorder(object):
 def publisher(topic, kind):
     """A publisher with a subscriber."""
     result = rospy.Publisher(topic, kind, queue_size=100)
-    wait_until(lambda: result.get_num_connections() > 0, 'a subscriber on ' + topic, STARTING_S)
+    wait_until(lambda: result.get_num_connections() > 0, 'a subscriber on ' + topic)
     return result
 
 

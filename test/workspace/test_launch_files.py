@@ -1,7 +1,7 @@
 """Parameters, nodes and topics that launch files set for their arguments, with stand-ins for realsense2_camera.
 
-test_package.py loads each launch file, test_camera_mount.py those with the pose of a camera. test_navigation.py runs
-navigation.launch with the planners.
+test_package.py loads each launch file, test_camera_mount.py those with the pose of a camera. test/nodes/navigation.test
+runs navigation.launch with the planners.
 """
 import os
 import re
