@@ -6,29 +6,23 @@ import subprocess
 import threading
 import time
 
-import numpy as np
 import pytest
 import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rosgraph_msgs.msg import Log
-from sensor_msgs.msg import CameraInfo, Image
+from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray
-from tf2_msgs.msg import TFMessage
 
-from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.camera.images import DepthImage
-from ros_3d_bb.conversions.camera_msgs import CameraFrame, messages_of
-from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg
+from fuzz.hostile import good_messages, transforms
+from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC as DEPTH, INFO_TOPICS, TYPES
+from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC as BOXES
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.doctor import graph_findings
 from ros_3d_bb_lab.evaluation.launching import free_port, running_roslaunch
-from support.ros import Recorder, header_at, wait_until
+from support.ros import Recorder, wait_until
 
-COLOR, DEPTH = 'camera/color/image_raw', 'camera/aligned_depth_to_color/image_raw'
-INFO, DEPTH_INFO, BOXES = 'camera/color/camera_info', 'camera/aligned_depth_to_color/camera_info', 'yolo_bounding_box'
-KINDS = {'tf': TFMessage, INFO: CameraInfo, DEPTH_INFO: CameraInfo, DEPTH: Image, COLOR: Image, BOXES: Int32MultiArray}
-MAP_FROM_CAMERA = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1.0]])
+INFO, KINDS = INFO_TOPICS[0], dict(TYPES, **{BOXES: Int32MultiArray})
 PERIOD_S = 0.1
 TWO_YEARS_NS = 63000000 * NS
 
@@ -78,18 +72,13 @@ def unchanged(_stamp_ns):
 
 def messages_at(stamp_ns):
     """{topic: message} of an image and its boxes, in the order in which they are sent."""
-    header, depth = header_at(stamp_ns), DepthImage(np.full((48, 64), 2000, np.uint16), 0.001)
-    messages = dict(messages_of(CameraFrame(header, Camera(64, 48, 60.0, 60.0, 31.5, 23.5),
-                                            np.zeros((48, 64, 3), np.uint8), depth,
-                                            [('map', header.frame_id, MAP_FROM_CAMERA)])))
-    messages[BOXES] = boxes2d_to_msg(np.array([[20, 10, 44, 38]]), header)
-    return messages
+    return dict(good_messages(stamp_ns), tf=transforms(stamp_ns))
 
 
 # The fault (see Rig.change); the node that reports it and words of its report; words of doctor, and of its fix.
 FAULTS = {
     'no tf': (lambda _stamp_ns: {'tf': None}, 'tracker_node',
-              'the transform from camera_color_optical_frame to map ends', 'tf has no frames', 'robot_state_publisher'),
+              'the transform from camera to base_link ends', 'tf has no frames', 'robot_state_publisher'),
     'stamps of two years ago': (lambda stamp_ns: messages_at(stamp_ns - TWO_YEARS_NS), 'bbox3d_node',
                                 '729.2 days before ROS time', '729.2 days before ROS time', 'use_sim_time'),
     'no boxes': (lambda _stamp_ns: {BOXES: None}, 'bbox3d_node', 'no messages on /yolo_bounding_box',

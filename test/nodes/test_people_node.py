@@ -11,7 +11,7 @@ from dynamic_reconfigure.client import Client
 from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.srv import Reconfigure
 from rosgraph_msgs.msg import Log
-from sensor_msgs.msg import CompressedImage, Image
+from sensor_msgs.msg import Image
 from std_msgs.msg import String
 
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
@@ -23,7 +23,7 @@ from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams
 from ros_3d_bb.visualization.markers import MarkerParams
-from support.compressed import compressed_fields
+from support.compressed import compressed
 from support.ros import TIMEOUT_S, Recorder, depth_message, publisher, wait_until
 
 LIVE = {'bbox3d_node': live_in([Bbox3dParams]),
@@ -35,8 +35,8 @@ NODES = sorted(LIVE)
 def test_the_publisher_decides_the_type_of_images():
     """A message of another type is left out; the diagnostics report such a topic as silent."""
     image, received = depth_message(NS, 2000), {}
-    for name, message in (('plain', image), ('other', String('no image')), ('compressed', CompressedImage(
-            **compressed_fields(image, 'compressedDepth rvl')))):
+    for name, message in (('plain', image), ('other', String('no image')),
+                          ('compressed', compressed(image, 'compressedDepth rvl'))):
         received[name] = []
         unsubscribe = subscribe('images/' + name, Image, received[name].append)
         sender = publisher('images/' + name, type(message))

@@ -4,12 +4,9 @@ import re
 from collections import namedtuple
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-# Pages with blocks that are run. Other pages of doc/ have none, or tests of their own.
-PAGES = ('README.md',) + tuple('doc/%s.md' % name for name in (
-    'bags', 'benchmark_methods', 'benchmarks', 'cameras', 'campaign', 'container', 'detectors', 'faults', 'installing',
-    'jackal', 'migrating', 'onnx', 'other_cameras', 'planner_outputs', 'planners', 'questions', 'realsense', 'robot',
-    'rviz', 'security', 'simulation', 'topics', 'troubleshooting', 'tuning'))
-
+MADE_PAGES = 'launch_files.md', 'messages.md'
+PAGES = ['README.md'] + sorted('doc/' + name for name in os.listdir(os.path.join(ROOT, 'doc'))
+                               if name.endswith('.md') and name not in MADE_PAGES)
 
 # Text between two fences; `language` is '' if the opening fence names none.
 Block = namedtuple('Block', 'page line language text')

@@ -3,7 +3,7 @@ import struct
 
 import cv2
 import numpy as np
-import rosbag
+from sensor_msgs.msg import CompressedImage
 
 from ros_3d_bb.conversions.image_msgs import pixels_from
 
@@ -11,8 +11,8 @@ QUANTIZATION, MAX_M = 100.0, 10.0  # defaults of the compressed_depth_image_tran
 JPEG_QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 80]  # default of the compressed_image_transport
 
 
-def compressed_fields(message, codec='jpeg'):
-    """Fields of the CompressedImage of an image: jpeg, png, or of depth compressedDepth, compressedDepth rvl."""
+def compressed(message, codec):
+    """The CompressedImage of an image: jpeg, png, or of depth compressedDepth, compressedDepth rvl."""
     pixels, encoding = pixels_from(message)
     if codec.startswith('compressedDepth'):
         text, data = '%s; %s' % (encoding, codec), compressed_depth(pixels, 'rvl' in codec)
@@ -21,24 +21,7 @@ def compressed_fields(message, codec='jpeg'):
         text = '%s; %s compressed %s' % (encoding, codec, 'bgr8' if is_color else '')
         _done, data = cv2.imencode('.' + codec, pixels[..., ::-1] if encoding == 'rgb8' else pixels, JPEG_QUALITY)
         data = data.tobytes()
-    return {'header': message.header, 'format': text, 'data': data}
-
-
-def rewritten(source, target, changes):
-    """Copy a bag; `changes` has a function for the messages of each changed topic of the nodes.
-
-    Returns {topic: topic in the bag} of those that were compressed, which have the names of image_transport.
-    """
-    names = {}
-    with rosbag.Bag(str(source)) as old, rosbag.Bag(str(target), 'w') as new:
-        for topic, message, time in old.read_messages():
-            change = changes.get(topic[1:])
-            message = message if change is None else change(message)
-            if change is not None and hasattr(message, 'format'):
-                names[topic[1:]] = topic[1:] + ('/compressedDepth' if 'Depth' in message.format else '/compressed')
-                topic = '/' + names[topic[1:]]
-            new.write(topic, message, time)
-    return names
+    return CompressedImage(message.header, text, data)
 
 
 def compressed_depth(pixels, is_rvl=False):

@@ -2,7 +2,6 @@
 import genpy
 import numpy as np
 import pytest
-from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import Header
 
 from ros_3d_bb.bags.bag_pipeline import process_bag
@@ -18,8 +17,8 @@ from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
 from ros_3d_bb.nodes.people_node import PeopleNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.pipeline.people_pipeline import Settings
-from support.bags import messages_in, scene_bag
-from support.compressed import compressed_fields, rewritten
+from support.bags import changed_bag, messages_in, scene_bag
+from support.compressed import compressed
 from support.masterless import masterless, published
 from support.ros import wait_until
 
@@ -31,10 +30,13 @@ CODECS = {'plain': {}, 'compressed': {COLOR_TOPIC: 'jpeg', DEPTH_TOPIC: 'compres
 
 @pytest.fixture(scope='module', params=sorted(CODECS))
 def bags(request, tmp_path_factory):
-    folder = tmp_path_factory.mktemp('bags')
-    names = rewritten(scene_bag(folder / 'plain.bag', SCENE), folder / 'in.bag', {
-        topic: lambda message, codec=codec: CompressedImage(**compressed_fields(message, codec))
-        for topic, codec in CODECS[request.param].items()})
+    folder, codecs = tmp_path_factory.mktemp('bags'), CODECS[request.param]
+    names = {topic: '%s/%s' % (topic, 'compressedDepth' if topic == DEPTH_TOPIC else 'compressed') for topic in codecs}
+
+    def with_codec(topic, message, time):
+        codec, name = codecs.get(topic[1:]), names.get(topic[1:], topic[1:])
+        return '/' + name, compressed(message, codec) if codec else message, time
+    changed_bag(scene_bag(folder / 'plain.bag', SCENE), folder / 'in.bag', with_codec)
     process_bag(str(folder / 'in.bag'), str(folder / 'out.bag'), Settings(detector='depth', names=names))
     return str(folder / 'in.bag'), str(folder / 'out.bag')
 

@@ -8,6 +8,7 @@ import xml.etree.ElementTree as ElementTree
 
 import pytest
 import yaml
+from roslib.packages import find_node
 
 from ros_3d_bb.core.params import check, params_from, table_of
 from support.launching import loaded
@@ -129,7 +130,7 @@ def test_launch_files_load_and_document_their_arguments(name):
     parameters, nodes = loaded(name, *REQUIRED_ARGUMENTS)
     assert nodes
     for node in nodes.values():
-        assert node.package != 'ros_3d_bb' or os.path.exists(inside('scripts', node.type))
+        assert node.package in OPTIONAL or find_node(node.package, node.type), node.type
     for value in parameters.values():  # files, which are installed
         inner = os.path.relpath(os.path.realpath(str(value)), ROOT)
         if str(value).startswith(os.sep) and not inner.startswith(os.pardir):

@@ -98,7 +98,6 @@ def test_the_site_has_every_page_and_each_link_has_a_target(tmp_path):
         assert (tmp_path / 'html' / 'doc' / (path + '.html')).exists()
 
 
-NAMED = PAGES + ('doc/error_model.md',)  # its blocks are the record of a campaign
 FORMAT = re.compile(r'%[-+\d.]*[a-zA-Z]')
 with open(os.path.join(ROOT, 'doc', 'figures.yaml'), encoding='utf-8') as _stream:
     FIGURES = yaml.safe_load(_stream)
@@ -179,7 +178,7 @@ def test_each_bold_figure_of_the_readme_is_a_measured_one():
     assert len(bold) >= 10 and [each for each in bold if not any(each in quote for quote in quotes)] == []
 
 
-@pytest.mark.parametrize('page', NAMED)
+@pytest.mark.parametrize('page', PAGES)
 def test_named_files_and_launch_arguments_exist(page):
     known = set(argument.get('name') for path in glob.glob(os.path.join(ROOT, 'launch', '*'))
                 for argument in ElementTree.parse(path).iter('arg'))

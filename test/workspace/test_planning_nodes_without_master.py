@@ -2,7 +2,7 @@ import contextlib
 
 import numpy as np
 import pytest
-from sensor_msgs.msg import CompressedImage, Image, LaserScan, PointCloud2, PointField
+from sensor_msgs.msg import Image, LaserScan, PointCloud2, PointField
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
@@ -17,7 +17,7 @@ from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.follow_node import RESENT_S, FollowNode
 from ros_3d_bb.nodes.people_removal_node import PeopleRemovalNode
 from ros_3d_bb.nodes.speed_limit_node import SpeedLimitNode
-from support.compressed import compressed_fields
+from support.compressed import compressed
 from support.masterless import masterless, on_the_wire
 from support.ros import camera_info, person
 from support.tracks import track_at
@@ -115,8 +115,7 @@ def test_compressed_depth_of_another_unit_is_sent_as_an_image(people):
                        np.full((48, 64), 8000, np.uint16), '16UC1')
     with node_with('depth', *people, depth_scale=0.00025) as connections:
         connections.send('~camera_info', camera_info(STAMP_NS))
-        compressed = CompressedImage(**compressed_fields(depth, 'compressedDepth png'))
-        values = imgmsg_to_depth(sent(connections, 'depth', compressed)).values
+        values = imgmsg_to_depth(sent(connections, 'depth', compressed(depth, 'compressedDepth png'))).values
     assert (values[24, 32] == 0) == bool(people) and values[0, 0] == 8000
 
 
