@@ -2,7 +2,7 @@
 import os
 import pathlib
 
-from ros_3d_bb_annotator.document import ESTIMATOR
+from ros_3d_bb_annotator.estimates import ESTIMATOR
 from ros_3d_bb_lab.evaluation.noise.analysis import Inputs, analyse as analyse_noise
 from ros_3d_bb_lab.evaluation.noise.report import text_of, write_results
 from ros_3d_bb_lab.evaluation.noise.tables import read_session_measurements

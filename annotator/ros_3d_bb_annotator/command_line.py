@@ -2,7 +2,8 @@
 import argparse
 import sys
 
-from ros_3d_bb_annotator.document import ESTIMATOR, Document
+from ros_3d_bb_annotator.document import Document
+from ros_3d_bb_annotator.estimates import ESTIMATOR
 from ros_3d_bb_annotator.export import export
 from ros_3d_bb_annotator.validation import problems_of
 

@@ -70,13 +70,15 @@ class Edits(object):
             if self._window.pane.truth.has_keyboard():
                 self._window.pane.truth.begin()
 
-    def add_box(self, box_px):
-        """Add a box that was drawn by hand, and select it. The truth has the keyboard then."""
-        self._change_box(Document.add_box, box_px)
-
-    def replace_box(self, box_px):
-        """Replace the selected box. The truth has the keyboard then."""
-        self._change_box(Document.replace_box, box_px)
+    def draw_box(self, box_px, is_new):
+        """Add a box that was drawn by hand, or replace the selected one, and select it. The truth has the keyboard then.
+        """
+        window = self._window
+        if self._edit(Document.draw_box, box_px, None if is_new else window.measurement.person):
+            position_m = window.document.estimates.of(window.current)[window.measurement.person]
+            window.statusBar().showMessage('The box is selected' if position_m is not None else
+                                           'The box has not enough depth for an estimate')
+            window.pane.truth.begin()
 
     def delete_box(self):
         self._edit(Document.delete_box)
@@ -92,13 +94,6 @@ class Edits(object):
         marks = dialogs.ask_marks(self._window, document.grid)
         if marks != document.grid and self._succeeds(lambda: document.set_grid(marks)):
             self._show(self._window.current)
-
-    def _change_box(self, edit, box_px):
-        if self._edit(edit, box_px):
-            position_m = self._window.document.estimates.of(self._window.current)[self._window.measurement.person]
-            self._window.statusBar().showMessage('The box is selected' if position_m is not None else
-                                                 'The box has not enough depth for an estimate')
-            self._window.pane.truth.begin()
 
     def _enter_truth(self, indices, truth_m):
         """Set a truth (x, y, z) of measurements. The user is asked about those where it is implausible."""

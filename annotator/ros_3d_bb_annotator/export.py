@@ -8,8 +8,7 @@ import os
 
 from ros_3d_bb.core.atomic_file import atomic_write
 from ros_3d_bb.estimation.error_model import RECORDED
-from ros_3d_bb.sessions.session_reader import SessionError
-from ros_3d_bb_annotator.measurement import ANNOTATED
+from ros_3d_bb.sessions.session_reader import ANNOTATED, SessionError
 
 AXES = 'XYZ'
 COLUMNS = (('id', 'label', 'stamp', 'x1', 'y1', 'x2', 'y2', 'estimator')
@@ -22,7 +21,8 @@ def rows_of(document, estimator):
 
     `estimator` is that of the noise analysis, or 'recorded' for the stored estimates.
     """
-    implausible = set((index, person) for index, person, _outlier in document.outliers())
+    document.estimates.complete()
+    implausible = document.estimates.implausible()
     for index, person, position_m, truth_m in _people_of(document, estimator):
         measurement, detection = document.measurements[index], document.measurements[index].detections[person]
         recorded_m = detection.estimate_m if detection.estimate_m is not None else (None,) * 3
@@ -30,7 +30,7 @@ def rows_of(document, estimator):
         yield ((measurement.id, measurement.label, measurement.stamp_text) + (detection.box_px or ('',) * 4)
                + (estimator,) + tuple(_millimetres(value_m) for values_m in (position_m, recorded_m, truth_m, errors_m)
                                       for value_m in values_m)
-               + ('yes' if (index, person) in implausible else '',))
+               + ('yes' if person in implausible.get(index, ()) else '',))
 
 
 def export(document, path, estimator):

@@ -206,8 +206,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
     def _connect(self):
         self.list.chosen.connect(self.show_measurement)
         self.pane.person_chosen.connect(self.edits.choose_person)
-        self.pane.shared.box_drawn.connect(self.edits.add_box)
-        self.pane.shared.box_edited.connect(self.edits.replace_box)
+        self.pane.shared.box_drawn.connect(self.edits.draw_box)
         self.pane.truth.entered.connect(self.edits.enter_truth)
         self.pane.floor.mark_chosen.connect(lambda mark: self.edits.enter_truth((mark.x_m, None, mark.z_m)))
 

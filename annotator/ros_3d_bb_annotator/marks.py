@@ -1,11 +1,19 @@
 """Floor marks as text: one mark per line with name, X and Z, separated by tabs, semicolons, commas or spaces."""
 import re
+from typing import NamedTuple
 
 from ros_3d_bb_annotator.lengths import parse_length
-from ros_3d_bb_annotator.measurement import Mark
 
 HEADER = re.compile(r'(name|mark|label)\b', re.IGNORECASE)
 LEAST_Z_M = 0.05  # people stand farther away; probably metres without a unit
+
+
+class Mark(NamedTuple):
+    """Marked position on the floor in the camera's optical frame: X to the right, Z forward, in metres."""
+
+    name: str
+    x_m: float
+    z_m: float
 
 
 def parse_marks(text):

@@ -1,6 +1,6 @@
 """List of measurements with their states: a Qt model, and a view."""
+from ros_3d_bb.sessions.session_reader import ANNOTATED, NEW, NOBODY, REJECTED
 from ros_3d_bb_annotator.lengths import number_text
-from ros_3d_bb_annotator.measurement import ANNOTATED, NEW, NOBODY, REJECTED
 from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets, Signal
 
 COLUMNS = ('ID', 'Label', 'State', 'X', 'Z', 'Error')

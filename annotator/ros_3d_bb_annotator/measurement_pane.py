@@ -5,13 +5,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ros_3d_bb.estimation.box3d_estimator import estimator_named
+from ros_3d_bb.sessions.session_reader import NOBODY
 from ros_3d_bb.visualization.image_overlay import DEPTH_RANGE_M, colorize_depth, depth_to_grey
-from ros_3d_bb_annotator.document import ESTIMATOR
+from ros_3d_bb_annotator.estimates import ESTIMATOR
 from ros_3d_bb_annotator.grid_view import FloorScene, GridView
 from ros_3d_bb_annotator.image_view import ImageView
 from ros_3d_bb_annotator.lengths import length_text, position_text
 from ros_3d_bb_annotator.marking import MarkedBox, Scene
-from ros_3d_bb_annotator.measurement import NOBODY
 from ros_3d_bb_annotator.measurement_list import COLORS, IMPLAUSIBLE
 from ros_3d_bb_annotator.qt import Qt, QtGui, QtWidgets, Signal
 from ros_3d_bb_annotator.shared_view import SharedView

@@ -2,7 +2,7 @@
 import os
 
 from ros_3d_bb_annotator import dialogs
-from ros_3d_bb_annotator.document import ESTIMATOR
+from ros_3d_bb_annotator.estimates import ESTIMATOR
 from ros_3d_bb_annotator.export import export
 from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets
 

@@ -11,13 +11,12 @@ class SharedView(QtCore.QObject):
     Image coordinates are continuous: pixel (u, v) covers u..u+1 and v..v+1. `center` is the point in the centre of the
     view as shares 0..1 of width and height. `cursor` and `corner`, the first corner of a box that is being drawn, are
     pixels (u, v) or None. `edited` is the box that is being moved or resized, [x1, y1, x2, y2], or None. `changed`:
-    views must be repainted; `box_drawn` and `box_edited`: (x1, y1, x2, y2) in pixels.
+    views must be repainted; `box_drawn`: (x1, y1, x2, y2) in pixels, and whether it is a new box, not the edited one.
     """
 
     changed = Signal()
     pointed = Signal()
-    box_drawn = Signal(object)
-    box_edited = Signal(object)
+    box_drawn = Signal(object, bool)
 
     def __init__(self, parent=None):
         super(SharedView, self).__init__(parent)
@@ -73,10 +72,10 @@ class SharedView(QtCore.QObject):
     def finish(self):
         """Complete the box that is being drawn or edited, unless it is tiny."""
         x1, y1, x2, y2 = box_px = self.rubber_band()
-        signal = self.box_drawn if self.edited is None else self.box_edited
+        is_new = self.edited is None
         self.cancel()
         if min(x2 - x1, y2 - y1) >= MIN_BOX_PX:
-            signal.emit(box_px)
+            self.box_drawn.emit(box_px, is_new)
 
     def cancel(self):
         self.corner = self.edited = None

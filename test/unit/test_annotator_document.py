@@ -7,7 +7,7 @@ from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.sessions.session_reader import SessionError, read_session
 from ros_3d_bb_annotator.document import Document
-from ros_3d_bb_annotator.measurement import Mark
+from ros_3d_bb_annotator.marks import Mark
 from ros_3d_bb_annotator.validation import problems_of
 from support.small_session import (FAR_BOX, NEAR_BOX, NEAR_MM, change_json, read_json, write_measurement,
                                    write_small_session)
@@ -36,7 +36,7 @@ def test_truth_is_saved_immediately_and_read_by_benchmarks(document, folder):
     entries = read_json(folder)['frames']
     assert entries[1]['truth_mm'] == {'x': 100, 'z': 2300} and entries[2]['truth_mm'] == {'x': 100, 'z': 2300, 'y': -50}
     frames = read_session(folder).frames
-    assert frames[1].truth_m.tolist() == [0.1, 2.3] and frames[1].truth_y_m is None and frames[2].truth_y_m == -0.05
+    assert frames[1].truth_m == (0.1, None, 2.3) and frames[2].truth_m == (0.1, -0.05, 2.3)
     assert frames[2].boxes_px == (FAR_BOX, NEAR_BOX) and frames[2].estimate_m.tolist() == [0.7, 0.1, 3.0]
     assert frames[0].stamp_ns == 1616161616000000005 and frames[0].label == 'by the door'
     assert Document.open(folder).measurements[2].truth_m == (0.1, -0.05, 2.3)
@@ -78,7 +78,7 @@ def test_measurements_added_by_a_viewer_are_kept_and_shown(document, folder):
 def test_two_annotators_keep_the_fields_of_each_other(document, folder):
     other = Document.open(folder)
     document.set_truths([0], 0.1, 2.0)
-    other.add_box(0, (1, 1, 30, 40))
+    other.draw_box(0, (1, 1, 30, 40))
     other.set_truths([1], 0.3, 2.2)
     assert read_json(folder)['frames'][0]['truth_mm'] == {'x': 100, 'z': 2000}
     assert document.refresh() and len(document.measurements[0].detections) == 3
@@ -113,21 +113,22 @@ def test_the_truth_belongs_to_the_nearest_box_unless_one_was_selected(document):
 def test_a_box_drawn_by_hand_is_estimated_and_chosen(document, folder):
     change_json(folder, lambda content: content['frames'][0]['detections'].pop(0))
     document.refresh()
-    box = document.add_box(0, NEAR_BOX)
+    document.draw_box(0, NEAR_BOX)
     drawn = document.measurements[0].detections[-1]
     assert document.measurements[0].person == 1 and drawn.by_hand and drawn.box_px == NEAR_BOX
-    assert box.center_m[2] == pytest.approx(NEAR_MM / 1000.0 + 0.09)  # the axis is behind the surface
-    assert np.abs(drawn.estimate_m - box.center_m).max() < 1e-5
-    assert drawn.support == pytest.approx(box.support, abs=1e-3) and drawn.truncated == box.truncated
+    assert drawn.estimate_m[2] == pytest.approx(NEAR_MM / 1000.0 + 0.09)  # the axis is behind the surface
+    assert document.estimates.of(0)[1] == pytest.approx(drawn.estimate_m, abs=1e-5)
+    assert drawn.support == pytest.approx(1, abs=1e-3) and drawn.truncated is True
     assert read_session(folder).frames[0].boxes_px == (NEAR_BOX, FAR_BOX)
 
 
 def test_a_box_drawn_by_hand_replaces_that_of_the_same_person(document, folder):
     change_json(folder, lambda content: content['frames'][0]['detections'][0].update(box=[10, 4, 26, 30]))
     document.refresh()
-    assert document.add_box(0, (-5, 4, 26, 44)) is not None
+    document.draw_box(0, (-5, 4, 26, 44))
     assert document.measurements[0].detections[-1].box_px == (0, 4, 26, 44)
-    assert document.add_box(0, NEAR_BOX).center_m[2] == pytest.approx(2.09)
+    document.draw_box(0, NEAR_BOX)
+    assert document.estimates.of(0)[3][2] == pytest.approx(2.09)
     assert read_session(folder).frames[0].boxes_px == (NEAR_BOX, FAR_BOX)
 
 

@@ -3,8 +3,7 @@ import re
 import pytest
 
 from ros_3d_bb_annotator.lengths import parse_length
-from ros_3d_bb_annotator.marks import parse_marks
-from ros_3d_bb_annotator.measurement import Mark
+from ros_3d_bb_annotator.marks import Mark, parse_marks
 
 MARKS = (Mark('A1', -0.6, 1.5), Mark('B1', 0.0, 1.5))
 

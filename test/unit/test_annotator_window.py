@@ -6,7 +6,7 @@ import pytest
 
 from ros_3d_bb_annotator import main_window
 from ros_3d_bb_annotator.document import Document
-from ros_3d_bb_annotator.measurement import Mark
+from ros_3d_bb_annotator.marks import Mark
 from support.small_session import FAR_BOX, NEAR_BOX, change_json, write_measurement, write_small_session
 from support.window import ALT, CONTROL, SHIFT, Qt, QtCore, QtGui, QtWidgets, opened
 

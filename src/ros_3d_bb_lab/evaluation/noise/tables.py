@@ -11,10 +11,9 @@ from typing import Any, NamedTuple, Tuple
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.box3d import plausible, truncated_edges
-from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
+from ros_3d_bb.estimation.box3d_estimator import estimator_named
 from ros_3d_bb.estimation.error_model import RECORDED
-from ros_3d_bb.sessions.plausibility import likely_errors, outlier_of
+from ros_3d_bb.sessions.plausibility import outliers_of
 from ros_3d_bb.sessions.session_reader import SessionError, annotated_people, read_depth, read_session
 
 AXES = ('X', 'Z')
@@ -51,11 +50,7 @@ class MeasurementTable(NamedTuple):
     def outliers(self):
         """Outliers of the table, see `plausibility`. Measurements of one axis are not checked."""
         complete = self.complete()
-        measured_m = complete.measured_m[:, [0, 2]]
-        likely = likely_errors(measured_m, complete.truth_m)
-        found = [outlier_of(name, likely, *positions_m)
-                 for name, *positions_m in zip(complete.ids, measured_m, complete.truth_m)]
-        return tuple(outlier for outlier in found if outlier is not None)
+        return tuple(filter(None, outliers_of(complete.ids, complete.measured_m[:, [0, 2]], complete.truth_m)))
 
     def without(self, outliers):
         """Select the measurements that are not among the outliers. Others of the same image remain."""
@@ -154,8 +149,8 @@ def read_session_measurements(folder, estimator):
     if not used:
         raise ValueError('%s: no frame with ground truth and an estimate (%s)' % (folder, estimator))
     positions_m, frames = zip(*used)
-    return MeasurementTable(str(folder), np.array(positions_m), np.array([frame.truth_m for frame in frames]),
-                            np.array([_is_cut(frame, session.camera) for frame in frames]),
+    return MeasurementTable(str(folder), np.array(positions_m), np.array([frame.truth_m[::2] for frame in frames]),
+                            np.array([any(frame.truncated_edges(session.camera)[::2]) for frame in frames]),
                             tuple(frame.name for frame in frames), tuple(left_out), session.camera, _dates_of(frames))
 
 
@@ -166,19 +161,11 @@ def _dates_of(frames):
 
 
 def _estimate(frame, session, name):
-    """Position (3,) of the annotated person of a frame, whose box is the first one, or None."""
+    """Position (3,) of the annotated person of a frame, or None."""
     if name == RECORDED:
         return frame.estimate_m
-    boxes = estimate_boxes(read_depth(frame, session), frame.boxes_px, session.camera, estimator_named(name),
-                           frame.level_from_camera)
-    return boxes[0].center_m if boxes and plausible(boxes[0]) else None
-
-
-def _is_cut(frame, camera):
-    if not frame.boxes_px:
-        return False
-    left, _top, right, _bottom = truncated_edges(frame.boxes_px[0], (0, 0) + camera[:2])
-    return left or right
+    box = frame.estimate(read_depth(frame, session), session.camera, estimator_named(name))
+    return None if box is None else box.center_m
 
 
 def _axis_of(row, axis, where):
