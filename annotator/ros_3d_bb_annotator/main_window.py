@@ -128,7 +128,6 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
     def closeEvent(self, event):  # noqa: N802 (Qt's name)
         self._refresh.stop()
         self._estimate.stop()
-        self.results.wait()
         super(AnnotatorWindow, self).closeEvent(event)
 
     def _go_to(self, number):

@@ -91,7 +91,7 @@ def test_a_campaign_whose_people_at_the_sides_are_all_truncated_is_named():
     table = MeasurementTable('made', np.insert(truth_m, 1, 0, axis=1), truth_m, truth_m[:, 0] != 0,
                              tuple(map(str, range(len(truth_m)))))
     with pytest.raises(ValueError, match='2 values of X true needed; there are 9 at 0 m, without people who are trunc'):
-        analyse(Inputs.of_session(table, 'foreground', 'none'))
+        analyse(Inputs.of(table, table, table, 'foreground', 'none'))
 
 
 SLIP_M = 0.3 + 1e-9  # larger slips must be found

@@ -90,20 +90,14 @@ class Inputs(NamedTuple):
     outliers: Tuple[Outlier, ...] = ()
 
     @classmethod
-    def of_tables(cls, z, x, x_variance, estimator, camera):
-        """Inputs without the outliers of the tables."""
+    def of(cls, z, x, x_variance, estimator, camera):
+        """Inputs without the outliers of the tables, which may be the same table, and for the variance without
+        truncated people."""
         found = [table.outliers() for table in (z, x, x_variance)]
-        unique = {(table.name, outlier.name): outlier for table, outliers in zip((z, x, x_variance), found)
-                  for outlier in outliers}
-        tables = (table.without(outliers) for table, outliers in zip((z, x, x_variance), found))
-        return cls(*tables, estimator, camera, tuple(unique.values()))
-
-    @classmethod
-    def of_session(cls, measurements, estimator, camera):
-        """Inputs from one table without its outliers."""
-        outliers = measurements.outliers()
-        plausible = measurements.without(outliers)
-        return cls(plausible, plausible, plausible.whole(), estimator, camera, outliers)
+        unique = {(table.name, outlier.name, *outlier.truth_m.tolist()): outlier
+                  for table, outliers in zip((z, x, x_variance), found) for outlier in outliers}
+        z, x, x_variance = (table.without(outliers) for table, outliers in zip((z, x, x_variance), found))
+        return cls(z, x, x_variance.whole(), estimator, camera, tuple(unique.values()))
 
 
 class Analysis(NamedTuple):

@@ -1,5 +1,6 @@
 """Output of the noise analysis: a folder with a report, its figures, a summary and an error model, and a short text."""
 import json
+import sys
 
 import numpy as np
 
@@ -33,12 +34,17 @@ def write_results(folder, analysis):
         model_path.unlink()
 
 
-def text_of(analysis):
-    """Mean error and standard deviation of both axes as text, one line per axis."""
-    return '\n'.join(
-        'f(%s) = %s, largest variance %.5f m², standard deviation %.4f m'
-        % (name, polynomial_text(axis.poly, name), variances.max_variance_m2, variances.max_sigma_m)
-        for name, axis, variances in (('z', analysis.z, analysis.z), ('x', analysis.x, analysis.x_variance)))
+def print_results(analysis, folder):
+    """Print mean error and standard deviation of both axes, what is left out, and the path of the report."""
+    for outlier in analysis.inputs.outliers:
+        print('left out of the analysis:', outlier, file=sys.stderr)
+    for name, axis, variances in (('z', analysis.z, analysis.z), ('x', analysis.x, analysis.x_variance)):
+        print('f(%s) = %s, largest variance %.5f m², standard deviation %.4f m' % (
+            name, polynomial_text(axis.poly, name), variances.max_variance_m2, variances.max_sigma_m))
+    if analysis.model_note:
+        print('note:', analysis.model_note, file=sys.stderr)
+    print('detector: not measured, default values; ./run noise --recordings measures it')
+    print('report: %s' % (folder / 'report.html'))
 
 
 def _summary(analysis, _figures):
