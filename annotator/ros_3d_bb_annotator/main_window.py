@@ -49,7 +49,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         """Method that an action calls: a method of the window or of one of its parts."""
         if name.startswith('choose_'):
             return functools.partial(self.edits.choose_person, int(name.split('_')[1]) - 1)
-        owners = self, self.edits, self.results, self.pane.shared, self.pane.truth
+        owners = self, self.edits, self.results, self.pane.images, self.pane.truth
         return next(getattr(owner, name) for owner in owners if hasattr(owner, name))
 
     def ask_session(self):
@@ -205,7 +205,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
     def _connect(self):
         self.list.chosen.connect(self.show_measurement)
         self.pane.person_chosen.connect(self.edits.choose_person)
-        self.pane.shared.box_drawn.connect(self.edits.draw_box)
+        self.pane.images.box_drawn.connect(self.edits.draw_box)
         self.pane.truth.entered.connect(self.edits.enter_truth)
         self.pane.floor.mark_chosen.connect(lambda mark: self.edits.enter_truth((mark.x_m, None, mark.z_m)))
 

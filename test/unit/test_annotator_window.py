@@ -11,8 +11,8 @@ from support.small_session import FAR_BOX, NEAR_BOX, change_json, write_measurem
 from support.window import ALT, CONTROL, SHIFT, Qt, QtCore, QtGui, QtWidgets, opened
 
 
-def place_in(view, x, y):
-    return view.transform().map(QtCore.QPointF(x, y))
+def place_in(view, x, y, panel=0):
+    return view.transform(panel).map(QtCore.QPointF(x, y))
 
 
 def test_the_error_of_a_typed_truth_is_shown_and_enter_saves_it(drive, folder):
@@ -36,15 +36,15 @@ def test_invalid_truth_is_reported_next_to_the_fields(drive, x, z, problem, fiel
     assert truth.fields[field].hasFocus()
 
 
-@pytest.mark.parametrize('name', ['color_view', 'depth_view'])
-def test_a_click_on_a_box_or_its_list_entry_selects_it(drive, folder, name):
-    view = getattr(drive.window.pane, name)
-    drive.click(view, place_in(view, *np.mean([FAR_BOX[:2], FAR_BOX[2:]], axis=0)))
+@pytest.mark.parametrize('panel', [0, 1])
+def test_a_click_on_a_box_or_its_list_entry_selects_it(drive, folder, panel):
+    view = drive.window.pane.images
+    drive.click(view, place_in(view, *np.mean([FAR_BOX[:2], FAR_BOX[2:]], axis=0), panel))
     assert opened(folder)[0].person == 1
-    view._shared.zoom_by(2, (20, 24))
-    drive.click(view, place_in(view, NEAR_BOX[2] - 1, 24))
+    view.zoom_by(2, (20, 24))
+    drive.click(view, place_in(view, NEAR_BOX[2] - 1, 24, panel))
     assert opened(folder)[0].person == 0
-    drive.click(view, place_in(view, 33, 24))  # between the people
+    drive.click(view, place_in(view, 33, 24, panel))  # between the people
     assert opened(folder)[0].person == 0
     people = drive.window.pane.people
     people.scrollToItem(people.item(1))
@@ -53,7 +53,7 @@ def test_a_click_on_a_box_or_its_list_entry_selects_it(drive, folder, name):
 
 
 def test_a_box_is_drawn_with_shift_and_drag_unless_it_is_tiny(drive, folder):
-    view = drive.window.pane.color_view
+    view = drive.window.pane.images
     drive.drag(view, place_in(view, 20.5, 20.5), place_in(view, 22.5, 22.5), SHIFT)
     assert len(drive.measurement(0).detections) == 2 and not drive.document.can_undo
     drive.drag(view, place_in(view, 11.5, 5.5), place_in(view, 25.5, 43.5), SHIFT)
@@ -119,7 +119,7 @@ def test_an_implausible_position_is_asked_about_and_enter_corrects_it(drive, fol
 
 
 def test_boxes_are_moved_resized_and_deleted(drive, folder):
-    view = drive.window.pane.color_view
+    view = drive.window.pane.images
     x1, y1, x2, y2 = NEAR_BOX
     drive.drag(view, place_in(view, x2, 24), place_in(view, x2 + 4, 24))
     assert opened(folder)[0].detections[0].box_px == (x1, y1, x2 + 4, y2)
@@ -190,9 +190,9 @@ def test_a_measurement_after_a_deleted_one_is_shown_with_its_image(fast_refresh,
     change_json(folder, lambda content: content['frames'].__setitem__(3, entry))
     drive.wait_for(lambda: drive.measurement(3).id == 'm4')
     assert drive.document.estimates.of(3)[0][2] == pytest.approx(before_m - 0.5, abs=0.02)
-    shown = drive.window.pane.depth_view.image
+    shown = drive.window.pane.images.panels[1].image
     drive.window.show_measurement(2)
-    assert drive.window.pane.depth_view.image != shown
+    assert drive.window.pane.images.panels[1].image != shown
 
 
 def test_an_invalid_session_gives_a_message(window_on, tmp_path):
