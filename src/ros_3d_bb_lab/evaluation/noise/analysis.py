@@ -4,7 +4,6 @@ import os
 from typing import NamedTuple, Optional, Tuple
 
 import numpy as np
-from scipy import stats
 
 from ros_3d_bb.estimation.error_model import ErrorModel
 from ros_3d_bb.sessions.plausibility import Outlier
@@ -12,41 +11,14 @@ from ros_3d_bb_lab.evaluation.error_model_fit import fit_error_model
 from ros_3d_bb_lab.evaluation.noise.tables import MeasurementTable, clusters_of
 
 Z_DEGREE, X_DEGREE = 2, 1
-SIGNIFICANCE = 0.05  # of the normality test
-LEAST_TO_TEST = 8  # measurements
-
-
-class ClusterStatistics(NamedTuple):
-    """Statistics of one cluster, in metres.
-
-    `variance_m2` is divided by n, as in the thesis. `shapiro_p` is the result of the Shapiro-Wilk test; None if all
-    errors are equal, or if there are fewer than 8.
-    """
-
-    truth_m: float
-    count: int
-    mean_m: float
-    variance_m2: float
-    rms_m: float
-    shapiro_p: Optional[float] = None
-
-    @property
-    def sigma_m(self):
-        return float(np.sqrt(self.variance_m2))
-
-    @property
-    def tested(self):
-        """Whether there were enough measurements for the test."""
-        return self.shapiro_p is not None
-
-    @property
-    def looks_gaussian(self):
-        """Whether the test does not reject a Gaussian at 5 %."""
-        return self.tested and self.shapiro_p >= SIGNIFICANCE
+SUMMARY = 'truth_m', 'count', 'mean_m', 'variance_m2', 'rms_m', 'shapiro_p'  # of a cluster
 
 
 class AxisStatistics(NamedTuple):
-    """Clusters of one axis, and the polynomial of their mean error by true value, highest power first."""
+    """Clusters of one axis, and the polynomial of their mean error by true value, highest power first.
+
+    It is fitted with equal weights of the clusters, as in the thesis.
+    """
 
     poly: tuple
     clusters: tuple
@@ -60,20 +32,11 @@ class AxisStatistics(NamedTuple):
         return float(np.sqrt(self.max_variance_m2))
 
 
-def axis_statistics(clusters, degree):
-    """Compute the statistics of clusters, and fit a polynomial to their means with equal weights (as in the thesis)."""
-    described = tuple(cluster_statistics(cluster) for cluster in clusters)
-    poly = np.polyfit([cluster.truth_m for cluster in described], [cluster.mean_m for cluster in described], degree)
-    return AxisStatistics(tuple(poly.tolist()), described)
-
-
-def cluster_statistics(cluster):
-    error_m = cluster.error_m
-    found = ClusterStatistics(cluster.truth_m, len(error_m), float(error_m.mean()), float(error_m.var()),
-                              float(np.sqrt((error_m ** 2).mean())))
-    if len(error_m) < LEAST_TO_TEST or np.ptp(error_m) == 0:
-        return found
-    return found._replace(shapiro_p=float(stats.shapiro(error_m)[1]))
+def axis_statistics(table, axis, degree):
+    """Statistics of an axis, 'X' or 'Z'. Raises ValueError if there are too few clusters."""
+    clusters = clusters_of(table, axis, degree + 1)
+    poly = np.polyfit([cluster.truth_m for cluster in clusters], [cluster.mean_m for cluster in clusters], degree)
+    return AxisStatistics(tuple(poly.tolist()), tuple(clusters))
 
 
 class Inputs(NamedTuple):
@@ -116,11 +79,6 @@ class Analysis(NamedTuple):
     date: str
 
     @property
-    def variance_clusters(self):
-        """Pairs (axis, ClusterStatistics) of the clusters that the variances are computed from."""
-        return [(name, cluster) for name, axis in (('Z', self.z), ('X', self.x_variance)) for cluster in axis.clusters]
-
-    @property
     def model_note(self):
         """Why there is no error model; '' if there is one."""
         return '' if self.model is not None else 'no error_model.yaml is written: %s' % self.no_model
@@ -128,10 +86,9 @@ class Analysis(NamedTuple):
 
 def analyse(inputs):
     """Analyse `inputs`, and return an Analysis. Raises ValueError if there are too few measurements."""
-    z, x = (axis_statistics(clusters_of(table, axis, degree + 1), degree) for table, axis, degree in (
-        (inputs.z, 'Z', Z_DEGREE), (inputs.x, 'X', X_DEGREE)))
+    z, x = axis_statistics(inputs.z, 'Z', Z_DEGREE), axis_statistics(inputs.x, 'X', X_DEGREE)
     try:
-        x_variance = axis_statistics(clusters_of(inputs.x_variance, 'X', X_DEGREE + 1), X_DEGREE)
+        x_variance = axis_statistics(inputs.x_variance, 'X', X_DEGREE)
     except ValueError as error:
         raise ValueError('%s, without people who are truncated by the left or right image border' % error)
     names = set(os.path.basename(os.path.abspath(table.name)) for table in (inputs.z, inputs.x, inputs.x_variance))
@@ -159,4 +116,4 @@ def summary_of(analysis):
 
 def _axis_summary(axis):
     return {'poly': list(axis.poly), 'max_variance_m2': axis.max_variance_m2, 'max_sigma_m': axis.max_sigma_m,
-            'clusters': [dict(cluster._asdict()) for cluster in axis.clusters]}
+            'clusters': [{name: getattr(cluster, name) for name in SUMMARY} for cluster in axis.clusters]}

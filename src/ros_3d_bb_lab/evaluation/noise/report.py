@@ -7,10 +7,12 @@ import numpy as np
 from ros_3d_bb.estimation.error_model import write_error_model
 from ros_3d_bb.sessions.plausibility import position_text
 from ros_3d_bb_lab.evaluation.html_report import figure, heading, html_report, paragraph, table
-from ros_3d_bb_lab.evaluation.noise.analysis import LEAST_TO_TEST, summary_of
-from ros_3d_bb_lab.evaluation.noise.figures import polynomial_text, write_figures
-from ros_3d_bb_lab.evaluation.noise.tables import LEAST_IN_CLUSTER, small_clusters
+from ros_3d_bb_lab.evaluation.noise.analysis import summary_of
+from ros_3d_bb_lab.evaluation.noise.figures import (error_by_truth, histograms, layout, polynomial_text, sigmas,
+                                                     variances)
+from ros_3d_bb_lab.evaluation.noise.tables import LEAST_IN_CLUSTER, LEAST_TO_TEST, small_clusters
 
+SIGNIFICANCE = 0.05  # of the normality test
 TITLE = 'Position errors of a depth camera'
 ESTIMATORS = {'foreground': 'foreground (that of bbox3d_node)', 'median': 'median (that of the thesis)',
               'recorded': 'recorded (as stored with the measurements)', '': 'unknown'}
@@ -22,9 +24,13 @@ def write_results(folder, analysis):
     The folder is created if it does not exist. The error model of an earlier analysis does not remain. Raises OSError.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    figures = {name: figure(folder / name, caption) for name, caption in write_figures(folder, analysis).items()}
+
+    def drawn(name, caption, draw, *arguments):
+        draw(folder / name, *arguments)
+        return figure(folder / name, caption)
+
     sections = _summary, _setup, _left_out, _z, _x, _model, _distributions
-    elements = [element for section in sections for element in section(analysis, figures)]
+    elements = [element for section in sections for element in section(analysis, drawn)]
     (folder / 'report.html').write_text(html_report(TITLE, elements), encoding='utf-8')
     (folder / 'summary.json').write_text(json.dumps(summary_of(analysis), indent=1), encoding='utf-8')
     model_path = folder / 'error_model.yaml'
@@ -38,16 +44,16 @@ def print_results(analysis, folder):
     """Print mean error and standard deviation of both axes, what is left out, and the path of the report."""
     for outlier in analysis.inputs.outliers:
         print('left out of the analysis:', outlier, file=sys.stderr)
-    for name, axis, variances in (('z', analysis.z, analysis.z), ('x', analysis.x, analysis.x_variance)):
+    for name, axis, spread in (('z', analysis.z, analysis.z), ('x', analysis.x, analysis.x_variance)):
         print('f(%s) = %s, largest variance %.5f m², standard deviation %.4f m' % (
-            name, polynomial_text(axis.poly, name), variances.max_variance_m2, variances.max_sigma_m))
+            name, polynomial_text(axis.poly, name), spread.max_variance_m2, spread.max_sigma_m))
     if analysis.model_note:
         print('note:', analysis.model_note, file=sys.stderr)
     print('detector: not measured, default values; ./run noise --recordings measures it')
     print('report: %s' % (folder / 'report.html'))
 
 
-def _summary(analysis, _figures):
+def _summary(analysis, _drawn):
     model = analysis.model
     rows = [('measurements (mean error)', _count(analysis.x), _count(analysis.z)),
             ('measurements (variance)', _count(analysis.x_variance), _count(analysis.z)),
@@ -83,7 +89,7 @@ def _bias_text(analysis):
                 '' if analysis.model is None else ' The error model corrects the mean error.'))
 
 
-def _setup(analysis, figures):
+def _setup(analysis, drawn):
     inputs = analysis.inputs
     camera, complete = inputs.z.camera, inputs.z.complete()
     positions = len(set(map(tuple, complete.truth_m.tolist())))
@@ -101,19 +107,22 @@ def _setup(analysis, figures):
                      np.degrees(2 * np.arctan(size / (2 * focal))) for focal, size in zip(camera[2:4], camera[:2]))),
                  ('distortion', '%s: %s' % (camera.distortion_model, ', '.join(
                      '%g' % value for value in camera.distortion)) if camera.distortion else 'none')]
-    return [heading('Measurements and camera'), table('measurements and camera', ('', 'value'), rows),
-            paragraph('A cluster is the set of all measurements with one true value of X, or of Z. Clusters of fewer '
-                      'than %d measurements are left out of the statistics of that axis.' % LEAST_IN_CLUSTER),
-            figures.get('layout.png', '')]  # not of tables of one axis
+    pieces = [heading('Measurements and camera'), table('measurements and camera', ('', 'value'), rows),
+              paragraph('A cluster is the set of all measurements with one true value of X, or of Z. Clusters of fewer '
+                        'than %d measurements are left out of the statistics of that axis.' % LEAST_IN_CLUSTER)]
+    if len(complete.truth_m):  # not tables of one axis
+        pieces.append(drawn('layout.png', 'true positions (number of measurements) and estimates, from above', layout,
+                            complete))
+    return pieces
 
 
-def _left_out(analysis, _figures):
+def _left_out(analysis, _drawn):
     inputs = analysis.inputs
     reasons = {}
     for name, reason in inputs.z.left_out:
         reasons.setdefault(reason, []).append(name)
     rows = [(str(len(names)), reason, ', '.join(names)) for reason, names in sorted(reasons.items())]
-    rows += [(str(len(cluster.error_m)), 'fewer than %d with %s = %.2f m' % (LEAST_IN_CLUSTER, axis, cluster.truth_m),
+    rows += [(str(cluster.count), 'fewer than %d with %s = %.2f m' % (LEAST_IN_CLUSTER, axis, cluster.truth_m),
               'statistics of %s only' % axis) for axis, errors in (('Z', inputs.z), ('X', inputs.x_variance))
              for cluster in small_clusters(errors, axis)]
     pieces = [heading('Measurements that were left out')]
@@ -129,46 +138,50 @@ def _left_out(analysis, _figures):
              '–' if outlier.intended_m is None else position_text(outlier.intended_m)) for outlier in inputs.outliers])]
 
 
-def _z(analysis, figures):
+def _z(analysis, drawn):
     return [heading('Errors in Z, the distance ahead'),
             paragraph('f(z) = %s metres, fitted to the mean errors of the clusters with equal weights.'
                       % polynomial_text(analysis.z.poly, 'z')),
-            figures['z_error.png'], _cluster_table(analysis.z, 'Z', 'errors in Z by true Z'),
-            figures['z_variance.png']]
+            drawn('z_error.png', 'error in Z by true Z, and f(z)', error_by_truth, analysis.z, 'Z'), _cluster_table(analysis.z, 'Z', 'errors in Z by true Z'),
+            drawn('z_variance.png', 'variance of the error in Z by true Z', variances, analysis.z, 'Z')]
 
 
-def _x(analysis, figures):
+def _x(analysis, drawn):
     pieces = [heading('Errors in X, to the side'),
               paragraph('f(x) = %s metres.' % polynomial_text(analysis.x.poly, 'x')),
-              figures['x_error.png'], _cluster_table(analysis.x, 'X', 'errors in X by true X')]
-    if analysis.x_variance != analysis.x:
+              drawn('x_error.png', 'error in X by true X, and f(x)', error_by_truth, analysis.x, 'X'), _cluster_table(analysis.x, 'X', 'errors in X by true X')]
+    if analysis.x_variance.poly != analysis.x.poly:
         pieces += [paragraph('The mean error is that of all measurements. Variance and distribution are those of the '
                              '%s measurements of people who are not truncated by the image border.'
                              % _count(analysis.x_variance)),
                    _cluster_table(analysis.x_variance, 'X', 'errors in X of people who are not truncated')]
-    return pieces + [figures['x_variance.png']]
+    return pieces + [drawn('x_variance.png', 'variance of the error in X by true X', variances, analysis.x_variance,
+                           'X')]
 
 
-def _distributions(analysis, figures):
-    tested = [cluster for _name, cluster in analysis.variance_clusters if cluster.tested]
+def _distributions(analysis, drawn):
+    z_clusters, x_clusters = analysis.z.clusters, analysis.x_variance.clusters
+    tests = [cluster.shapiro_p for cluster in z_clusters + x_clusters if cluster.shapiro_p is not None]
     return [
         heading('Distribution of the errors'),
         paragraph('The Shapiro–Wilk test accepts a Gaussian for %d of %d tested clusters. It rejects a Gaussian if p '
                   '(in the tables of the clusters) is below 0.05. Small clusters are seldom rejected, which does not '
                   'prove that they are Gaussian. Clusters with fewer than %d measurements, or with equal errors, are '
-                  'not tested.' % (sum(cluster.looks_gaussian for cluster in tested), len(tested), LEAST_TO_TEST)),
-        figures['z_distribution.png'], figures['x_distribution.png']]
+                  'not tested.' % (sum(p >= SIGNIFICANCE for p in tests), len(tests), LEAST_TO_TEST)),
+        drawn('z_distribution.png', 'density of the error in Z, and the fitted Gaussian', histograms, z_clusters, 'Z'),
+        drawn('x_distribution.png', 'density of the error in X, and the fitted Gaussian', histograms, x_clusters, 'X')]
 
 
-def _model(analysis, figures):
+def _model(analysis, drawn):
     if analysis.model is None:
         pieces = [paragraph('%s%s.' % (analysis.model_note[:1].upper(), analysis.model_note[1:]))]
     else:
-        pieces = _model_pieces(analysis.model, figures)
+        pieces = _model_pieces(analysis, drawn)
     return [heading('Error model and its validation')] + pieces
 
 
-def _model_pieces(model, figures):
+def _model_pieces(analysis, drawn):
+    model = analysis.model
     scores, limits = model.cross_validated, model.measured_range
     z_bias = ' '.join('%+.4f%s' % (value, {0: '', 1: ' z', 2: ' z²', 3: ' z³'}[len(model.z_bias) - 1 - number])
                       for number, value in enumerate(model.z_bias))
@@ -183,7 +196,8 @@ def _model_pieces(model, figures):
             ('measured range', 'Z from %.2f to %.2f m, |X| to %.2f m'
              % (limits.z_min_m, limits.z_max_m, limits.x_max_m)),
             ('outside of it', 'bias as at its limit; σ grows by %.1f m per metre' % model.growth_outside))),
-        figures['sigma.png'],
+        drawn('sigma.png', 'standard deviation of the error model by range, and remaining errors of the positions',
+              sigmas, analysis),
         paragraph('Leave-one-position-out cross-validation: the measurements of each position are corrected by a model '
                   'of all other positions. The coverage is the share of them inside the ellipse of that model; ideally '
                   'it is that of the ellipse. σ is widened until the 95 %% ellipse contains 95 %%, because errors have '
@@ -197,7 +211,7 @@ def _cluster_table(axis, name, caption):
     return table(caption, header, [
         ('%.2f' % cluster.truth_m, '%d' % cluster.count, '%+.4f' % cluster.mean_m, '%.4f' % cluster.sigma_m,
          '%.6f' % cluster.variance_m2, '%.4f' % cluster.rms_m,
-         '%.4f' % cluster.shapiro_p if cluster.tested else 'not tested') for cluster in axis.clusters])
+         'not tested' if cluster.shapiro_p is None else '%.4f' % cluster.shapiro_p) for cluster in axis.clusters])
 
 
 def _spread_text(spread):

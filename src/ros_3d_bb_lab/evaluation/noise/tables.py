@@ -9,6 +9,7 @@ import datetime
 from typing import Any, NamedTuple, Tuple
 
 import numpy as np
+from scipy import stats
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d_estimator import estimator_named
@@ -18,6 +19,7 @@ from ros_3d_bb.sessions.session_reader import SessionError, annotated_people, re
 
 AXES = ('X', 'Z')
 LEAST_IN_CLUSTER = 3
+LEAST_TO_TEST = 8  # measurements, for the normality test
 LEAST_EXTENT_M = 0.05  # tables of less are in metres
 ROUNDING_MM = 1.01  # errors may have been computed before the values were rounded
 
@@ -72,24 +74,52 @@ class Cluster(NamedTuple):
     truth_m: float
     error_m: np.ndarray
 
+    @property
+    def count(self):
+        return len(self.error_m)
+
+    @property
+    def mean_m(self):
+        return float(self.error_m.mean())
+
+    @property
+    def variance_m2(self):
+        """Variance, divided by n, as in the thesis."""
+        return float(self.error_m.var())
+
+    @property
+    def sigma_m(self):
+        return float(np.sqrt(self.variance_m2))
+
+    @property
+    def rms_m(self):
+        return float(np.sqrt((self.error_m ** 2).mean()))
+
+    @property
+    def shapiro_p(self):
+        """Result of the Shapiro-Wilk test; None if all errors are equal, or there are fewer than LEAST_TO_TEST."""
+        if self.count < LEAST_TO_TEST or np.ptp(self.error_m) == 0:
+            return None
+        return float(stats.shapiro(self.error_m)[1])
+
 
 def clusters_of(measurements, axis, least=2):
     """Group the errors of an axis, 'X' or 'Z', by true value. Clusters with fewer than 3 measurements are left out.
 
     Raises ValueError if fewer than `least` clusters remain.
     """
-    clusters = [cluster for cluster in _groups_of(measurements, axis) if len(cluster.error_m) >= LEAST_IN_CLUSTER]
+    clusters = [cluster for cluster in _groups_of(measurements, axis) if cluster.count >= LEAST_IN_CLUSTER]
     if len(clusters) < least:
         raise ValueError('%s: at least %d measurements at each of %d values of %s true needed; there are %s' % (
             measurements.name, LEAST_IN_CLUSTER, least, axis, ', '.join(
-                '%d at %g m' % (len(group.error_m), group.truth_m)
+                '%d at %g m' % (group.count, group.truth_m)
                 for group in _groups_of(measurements, axis)) or 'none'))
     return clusters
 
 
 def small_clusters(measurements, axis):
     """Clusters of an axis that `clusters_of` leaves out."""
-    return [cluster for cluster in _groups_of(measurements, axis) if len(cluster.error_m) < LEAST_IN_CLUSTER]
+    return [cluster for cluster in _groups_of(measurements, axis) if cluster.count < LEAST_IN_CLUSTER]
 
 
 def _groups_of(measurements, axis):
