@@ -4,12 +4,13 @@ import html
 import numpy as np
 
 from ros_3d_bb.estimation.box3d_estimator import estimator_named
+from ros_3d_bb.sessions.plausibility import position_text
 from ros_3d_bb.sessions.session_reader import NOBODY
 from ros_3d_bb.visualization.image_overlay import DEPTH_RANGE_M, colorize_depth, depth_to_grey
 from ros_3d_bb_annotator.estimates import ESTIMATOR
 from ros_3d_bb_annotator.grid_view import FloorScene, GridView
 from ros_3d_bb_annotator.image_view import ImageView, Panel
-from ros_3d_bb_annotator.lengths import length_text, position_text
+from ros_3d_bb_annotator.lengths import length_text
 from ros_3d_bb_annotator.marking import MarkedBox, Scene
 from ros_3d_bb_annotator.measurement_list import COLORS, IMPLAUSIBLE
 from ros_3d_bb_annotator.qt import Qt, QtGui, QtWidgets, Signal
@@ -153,7 +154,7 @@ class MeasurementPane(QtWidgets.QWidget):
         floor_layout.setContentsMargins(4, 4, 4, 4)
         floor_layout.addWidget(self.floor)
         layout = QtWidgets.QHBoxLayout()
-        people_box.setMinimumWidth(self.fontMetrics().boundingRect('recorded: X +0000').width())
+        people_box.setMinimumWidth(self.fontMetrics().boundingRect('recorded: X −0000').width())
         layout.addWidget(people_box, 4)
         layout.addLayout(middle, 4)
         layout.addWidget(floor_box, 4)
@@ -171,9 +172,9 @@ def _detection_text(number, detection, position_m, truth_m):
     """Description of a detection: the analysed estimate, the recorded one, and details."""
     details = (detection.support is not None and 'support %.0f %%' % (100 * detection.support),
                detection.truncated and 'truncated', detection.by_hand and 'drawn by hand')
-    lines = ('no estimate' if position_m is None else position_text(position_m),
-             detection.estimate_m is not None and 'recorded: %s' % position_text(detection.estimate_m),
-             truth_m is not None and 'true: %s' % position_text(truth_m), ', '.join(filter(None, details)))
+    lines = ('no estimate' if position_m is None else position_text(position_m[::2]),
+             detection.estimate_m is not None and 'recorded: %s' % position_text(detection.estimate_m[::2]),
+             truth_m is not None and 'true: %s' % position_text(truth_m[::2]), ', '.join(filter(None, details)))
     return '%d: %s' % (number + 1, '\n'.join(filter(None, lines)))
 
 
