@@ -7,7 +7,6 @@ from ros_3d_bb.estimation.box3d_estimator import estimator_named
 from ros_3d_bb.sessions.plausibility import likely_errors, outlier_of, outliers_of
 
 ESTIMATOR = 'foreground'  # the default of bbox3d_node
-MANY = 500  # measurements, of which a single one has no influence on the likely errors
 
 
 class Estimates(object):
@@ -21,7 +20,7 @@ class Estimates(object):
 
     def update(self):
         """Adapt to changed measurements."""
-        self._people = self._likely = self._implausible = None
+        self._people = self._implausible = None
 
     def of(self, index, depth=None):
         """Positions of the detections of a measurement, each (3,) or None. `depth` is its depth image, if it is read.
@@ -72,8 +71,10 @@ class Estimates(object):
         position_m = self.of(index)[person]
         if position_m is None:
             return None
-        return outlier_of(self._document.measurements[index].name, self._likely_without(index), position_m[[0, 2]],
-                          np.array(truth_m[::2]))
+        people, measured_m, others_m = self._annotated()
+        others = np.array([other != index for other, _person in people], bool)
+        return outlier_of(self._document.measurements[index].name, likely_errors(measured_m[others], others_m[others]),
+                          position_m[[0, 2]], np.array(truth_m[::2]))
 
     def _position(self, measurement, depth):
         """Position (3,) of the selected person of a measurement, or None."""
@@ -95,16 +96,6 @@ class Estimates(object):
             rows = np.reshape(rows, (-1, 4)).astype(float)
             self._people = people, rows[:, :2], rows[:, 2:]
         return self._people
-
-    def _likely_without(self, excluded):
-        """LikelyErrors of the annotated people in measurements other than `excluded`."""
-        people, measured_m, truth_m = self._annotated()
-        others = np.array([index != excluded for index, _person in people], bool)
-        if len(people) <= MANY and not others.all():
-            return likely_errors(measured_m[others], truth_m[others])
-        if self._likely is None:
-            self._likely = likely_errors(measured_m, truth_m)
-        return self._likely
 
 
 def _input_of(measurement):
