@@ -11,17 +11,19 @@ from ros_3d_bb_lab.evaluation.error_model_fit import fit_error_model
 from ros_3d_bb_lab.evaluation.noise.tables import MeasurementTable, clusters_of
 
 Z_DEGREE, X_DEGREE = 2, 1
+LEAST_IN_CLUSTER = 3  # measurements
 SUMMARY = 'truth_m', 'count', 'mean_m', 'variance_m2', 'rms_m', 'shapiro_p'  # of a cluster
 
 
 class AxisStatistics(NamedTuple):
     """Clusters of one axis, and the polynomial of their mean error by true value, highest power first.
 
-    It is fitted with equal weights of the clusters, as in the thesis.
+    It is fitted with equal weights of the clusters, as in the thesis. `small` clusters are left out.
     """
 
     poly: tuple
     clusters: tuple
+    small: tuple
 
     @property
     def max_variance_m2(self):
@@ -34,9 +36,15 @@ class AxisStatistics(NamedTuple):
 
 def axis_statistics(table, axis, degree):
     """Statistics of an axis, 'X' or 'Z'. Raises ValueError if there are too few clusters."""
-    clusters = clusters_of(table, axis, degree + 1)
+    found = clusters_of(table, axis)
+    clusters = tuple(cluster for cluster in found if cluster.count >= LEAST_IN_CLUSTER)
+    if len(clusters) <= degree:
+        raise ValueError('%s: at least %d measurements at each of %d values of %s true needed; there are %s' % (
+            table.name, LEAST_IN_CLUSTER, degree + 1, axis, ', '.join(
+                '%d at %g m' % (cluster.count, cluster.truth_m) for cluster in found) or 'none'))
     poly = np.polyfit([cluster.truth_m for cluster in clusters], [cluster.mean_m for cluster in clusters], degree)
-    return AxisStatistics(tuple(poly.tolist()), tuple(clusters))
+    return AxisStatistics(tuple(poly.tolist()), clusters,
+                          tuple(cluster for cluster in found if cluster.count < LEAST_IN_CLUSTER))
 
 
 class Inputs(NamedTuple):

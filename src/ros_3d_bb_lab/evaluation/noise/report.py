@@ -7,10 +7,10 @@ import numpy as np
 from ros_3d_bb.estimation.error_model import write_error_model
 from ros_3d_bb.sessions.plausibility import position_text
 from ros_3d_bb_lab.evaluation.html_report import figure, heading, html_report, paragraph, table
-from ros_3d_bb_lab.evaluation.noise.analysis import summary_of
+from ros_3d_bb_lab.evaluation.noise.analysis import LEAST_IN_CLUSTER, summary_of
 from ros_3d_bb_lab.evaluation.noise.figures import (error_by_truth, histograms, layout, polynomial_text, sigmas,
                                                      variances)
-from ros_3d_bb_lab.evaluation.noise.tables import LEAST_IN_CLUSTER, LEAST_TO_TEST, small_clusters
+from ros_3d_bb_lab.evaluation.noise.tables import LEAST_TO_TEST
 
 SIGNIFICANCE = 0.05  # of the normality test
 TITLE = 'Position errors of a depth camera'
@@ -123,8 +123,8 @@ def _left_out(analysis, _drawn):
         reasons.setdefault(reason, []).append(name)
     rows = [(str(len(names)), reason, ', '.join(names)) for reason, names in sorted(reasons.items())]
     rows += [(str(cluster.count), 'fewer than %d with %s = %.2f m' % (LEAST_IN_CLUSTER, axis, cluster.truth_m),
-              'statistics of %s only' % axis) for axis, errors in (('Z', inputs.z), ('X', inputs.x_variance))
-             for cluster in small_clusters(errors, axis)]
+              'statistics of %s only' % axis) for axis, found in (('Z', analysis.z), ('X', analysis.x_variance))
+             for cluster in found.small]
     pieces = [heading('Measurements that were left out')]
     pieces.append(table('rejected and unusable measurements', ('number', 'reason', 'measurements'), rows) if rows
                   else paragraph('No measurement was rejected, and none was unusable.'))

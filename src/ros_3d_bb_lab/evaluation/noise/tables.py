@@ -18,7 +18,6 @@ from ros_3d_bb.sessions.plausibility import outliers_of
 from ros_3d_bb.sessions.session_reader import SessionError, annotated_people, read_depth, read_session
 
 AXES = ('X', 'Z')
-LEAST_IN_CLUSTER = 3
 LEAST_TO_TEST = 8  # measurements, for the normality test
 LEAST_EXTENT_M = 0.05  # tables of less are in metres
 ROUNDING_MM = 1.01  # errors may have been computed before the values were rounded
@@ -103,26 +102,8 @@ class Cluster(NamedTuple):
         return float(stats.shapiro(self.error_m)[1])
 
 
-def clusters_of(measurements, axis, least=2):
-    """Group the errors of an axis, 'X' or 'Z', by true value. Clusters with fewer than 3 measurements are left out.
-
-    Raises ValueError if fewer than `least` clusters remain.
-    """
-    clusters = [cluster for cluster in _groups_of(measurements, axis) if cluster.count >= LEAST_IN_CLUSTER]
-    if len(clusters) < least:
-        raise ValueError('%s: at least %d measurements at each of %d values of %s true needed; there are %s' % (
-            measurements.name, LEAST_IN_CLUSTER, least, axis, ', '.join(
-                '%d at %g m' % (group.count, group.truth_m)
-                for group in _groups_of(measurements, axis)) or 'none'))
-    return clusters
-
-
-def small_clusters(measurements, axis):
-    """Clusters of an axis that `clusters_of` leaves out."""
-    return [cluster for cluster in _groups_of(measurements, axis) if cluster.count < LEAST_IN_CLUSTER]
-
-
-def _groups_of(measurements, axis):
+def clusters_of(measurements, axis):
+    """Group the errors of an axis, 'X' or 'Z', by true value. Returns Clusters."""
     number = AXES.index(axis)
     truth_m, measured_m = measurements.truth_m[:, number], measurements.measured_m[:, 2 * number]
     known = np.isfinite(truth_m) & np.isfinite(measured_m)
