@@ -4,7 +4,9 @@ import contextlib
 import numpy as np
 
 from ros_3d_bb.estimation.box3d_estimator import estimator_named
+from ros_3d_bb.estimation.error_model import RECORDED
 from ros_3d_bb.sessions.plausibility import likely_errors, outlier_of, outliers_of
+from ros_3d_bb.sessions.session_reader import ANNOTATED
 
 ESTIMATOR = 'foreground'  # the default of bbox3d_node
 
@@ -82,19 +84,25 @@ class Estimates(object):
             box = measurement.estimate(depth, self._document.camera, estimator_named(ESTIMATOR))
             return None if box is None else box.center_m
 
+    def people(self, estimator=ESTIMATOR):
+        """Yield index, detection, estimate (3,) and truth (x, y, z) of the annotated people with a known estimate.
+
+        `estimator` is that of the noise analysis, or 'recorded' for the stored estimates.
+        """
+        for index, measurement in enumerate(self._document.measurements):
+            if measurement.state == ANNOTATED:
+                recorded = [detection.estimate_m for detection in measurement.detections]
+                positions = recorded if estimator == RECORDED else self.known(index)
+                for person, truth_m in sorted(measurement.truths.items()):
+                    if positions is not None and positions[person] is not None:
+                        yield index, person, positions[person], truth_m
+
     def _annotated(self):
-        """Pairs (index, detection) of annotated people with an estimate, measured and true (x, z), each (n, 2)."""
+        """Pairs (index, detection) of the annotated people, measured and true (x, z), each (n, 2)."""
         if self._people is None:
-            people, rows = [], []
-            for index, measurement in enumerate(self._document.measurements):
-                truths = measurement.truths if measurement.rejected is None else {}
-                positions = self.known(index) if truths else None
-                for person, truth_m in truths.items() if positions is not None else ():
-                    if positions[person] is not None:
-                        people.append((index, person))
-                        rows.append((positions[person][0], positions[person][2], truth_m[0], truth_m[2]))
-            rows = np.reshape(rows, (-1, 4)).astype(float)
-            self._people = people, rows[:, :2], rows[:, 2:]
+            people = list(self.people())
+            measured_m, truth_m = (np.reshape([one[column][::2] for one in people], (-1, 2)) for column in (2, 3))
+            self._people = [one[:2] for one in people], measured_m.astype(float), truth_m.astype(float)
         return self._people
 
 

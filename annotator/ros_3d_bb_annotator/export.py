@@ -7,8 +7,7 @@ import io
 import os
 
 from ros_3d_bb.core.atomic_file import atomic_write
-from ros_3d_bb.estimation.error_model import RECORDED
-from ros_3d_bb.sessions.session_reader import ANNOTATED, SessionError
+from ros_3d_bb.sessions.session_reader import SessionError
 
 AXES = 'XYZ'
 COLUMNS = (('id', 'label', 'stamp', 'x1', 'y1', 'x2', 'y2', 'estimator')
@@ -23,7 +22,7 @@ def rows_of(document, estimator):
     """
     document.estimates.complete()
     implausible = document.estimates.implausible()
-    for index, person, position_m, truth_m in _people_of(document, estimator):
+    for index, person, position_m, truth_m in document.estimates.people(estimator):
         measurement, detection = document.measurements[index], document.measurements[index].detections[person]
         recorded_m = detection.estimate_m if detection.estimate_m is not None else (None,) * 3
         errors_m = [None if None in pair else pair[0] - pair[1] for pair in zip(position_m, truth_m)]
@@ -48,18 +47,6 @@ def export(document, path, estimator):
     except OSError as error:
         raise SessionError('%s: cannot be written (%s)' % (path, error.strerror))
     return len(rows)
-
-
-def _people_of(document, estimator):
-    """Yield index, detection, estimate (3,) and truth (x, y, z) of the annotated people with an estimate."""
-    for index, measurement in enumerate(document.measurements):
-        if measurement.state != ANNOTATED:
-            continue
-        positions = ([detection.estimate_m for detection in measurement.detections] if estimator == RECORDED
-                     else document.estimates.of(index))
-        for person, truth_m in sorted(measurement.truths.items()):
-            if positions[person] is not None:
-                yield index, person, positions[person], truth_m
 
 
 def _millimetres(value_m):
