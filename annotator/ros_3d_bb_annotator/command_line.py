@@ -4,7 +4,7 @@ import sys
 
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.estimates import ESTIMATOR
-from ros_3d_bb_annotator.export import export
+from ros_3d_bb_annotator.export import analyse, export
 from ros_3d_bb_annotator.validation import problems_of
 
 
@@ -19,8 +19,8 @@ def main(arguments=None):
             count = export(Document.open(arguments.session), arguments.export, estimator)
             print('%s: %d rows' % (arguments.export, count))
         elif arguments.analyse:
-            from ros_3d_bb_annotator.analysis import analyse, print_results  # imports scipy and matplotlib
-            print_results(*analyse(arguments.session, arguments.out, estimator))
+            analysis, folder = analyse(arguments.session, arguments.out, estimator)
+            analysis.print_results(folder)
         else:
             return _validate(Document.open(arguments.session))
     except (ValueError, OSError) as error:

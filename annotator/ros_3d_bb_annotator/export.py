@@ -1,10 +1,11 @@
-"""Table of a session as CSV in millimetres, which `./run noise --z --x` reads. It has one row per annotated person.
+"""Results of a session: the noise analysis, and a table as CSV in millimetres, which `./run noise --z --x` reads.
 
-Errors are measured minus true values.
+The table has one row per annotated person. Errors are measured minus true values.
 """
 import csv
 import io
 import os
+import pathlib
 
 from ros_3d_bb.core.atomic_file import atomic_write
 from ros_3d_bb.sessions.session_reader import SessionError
@@ -47,6 +48,21 @@ def export(document, path, estimator):
     except OSError as error:
         raise SessionError('%s: cannot be written (%s)' % (path, error.strerror))
     return len(rows)
+
+
+def analyse(session, folder, estimator):
+    """Write report, figures and error model of the annotated measurements of a session to a folder.
+
+    By default it is `analysis` in the session. `estimator` is 'foreground', 'median', or 'recorded' for the stored
+    estimates. Returns the Analysis of the lab, and the folder (pathlib.Path). Raises ValueError if there are too few
+    measurements.
+    """
+    from ros_3d_bb_lab.evaluation.noise import analysis, report, tables  # optional scipy and matplotlib take a second
+    folder = pathlib.Path(folder or os.path.join(session, 'analysis'))
+    table = tables.read_session_measurements(session, estimator)
+    found = analysis.analyse(analysis.Inputs.of(table, table, table, estimator, 'unknown'))
+    report.write_results(folder, found)
+    return found, folder
 
 
 def _millimetres(value_m):

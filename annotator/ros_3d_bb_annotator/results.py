@@ -4,12 +4,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 from ros_3d_bb_annotator import dialogs
 from ros_3d_bb_annotator.estimates import ESTIMATOR
-from ros_3d_bb_annotator.export import export
+from ros_3d_bb_annotator.export import analyse, export
 from ros_3d_bb_annotator.qt import QtCore, QtGui, QtWidgets, Signal
 
 
 class Results(QtCore.QObject):
-    """Exports and analyses the document of a window. `analysis` is the last one, see `analysis.analyse`."""
+    """Exports and analyses the document of a window. `analysis` is the last one, see `export.analyse`."""
 
     _analysed = Signal()
 
@@ -41,7 +41,7 @@ class Results(QtCore.QObject):
         self._analysed.connect(waiting.accept)
         self.is_busy = True
         with ThreadPoolExecutor(1) as thread:
-            future = thread.submit(_analyse, self._window.document.folder)
+            future = thread.submit(analyse, self._window.document.folder, None, ESTIMATOR)
             future.add_done_callback(lambda _future: self._analysed.emit())
             waiting.exec_()
         self.is_busy = False
@@ -56,8 +56,3 @@ class Results(QtCore.QObject):
             text += '; %d implausible positions were left out (Ctrl+I)' % len(self.analysis.inputs.outliers)
         self._window.statusBar().showMessage(text)
         QtGui.QDesktopServices.openUrl(QtCore.QUrl.fromLocalFile(str(folder / 'report.html')))
-
-
-def _analyse(session):
-    from ros_3d_bb_annotator.analysis import analyse  # optional scipy and matplotlib take a second
-    return analyse(session, None, ESTIMATOR)

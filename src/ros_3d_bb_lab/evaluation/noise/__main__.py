@@ -10,7 +10,7 @@ import sys
 from ros_3d_bb.estimation.error_model import RECORDED, write_error_model
 from ros_3d_bb_lab.evaluation.noise.analysis import Inputs, analyse
 from ros_3d_bb_lab.evaluation.noise.recordings import fit_recordings
-from ros_3d_bb_lab.evaluation.noise.report import print_results, write_results
+from ros_3d_bb_lab.evaluation.noise.report import write_results
 from ros_3d_bb_lab.evaluation.noise.tables import read_session_measurements, read_table
 from ros_3d_bb_lab.evaluation.tracking.recorded_detections import read_recordings
 
@@ -26,7 +26,7 @@ def main():
         write_results(folder, analysis)
     except (ValueError, OSError) as error:
         sys.exit('./run noise: %s' % error)
-    print_results(analysis, folder)
+    analysis.print_results(folder)
 
 
 def _fit_recordings(arguments, folder):

@@ -1,6 +1,7 @@
 """Noise analysis: moments and a normality test of clusters of errors, and the resulting error model."""
 import datetime
 import os
+import sys
 from typing import NamedTuple, Optional, Tuple
 
 import numpy as np
@@ -32,6 +33,15 @@ class AxisStatistics(NamedTuple):
     @property
     def max_sigma_m(self):
         return float(np.sqrt(self.max_variance_m2))
+
+    def poly_text(self, variable):
+        """The polynomial in mathematical notation: −0.040 z² + 0.060 z + 0.008."""
+        text = ''
+        for power, value in zip(range(len(self.poly) - 1, -1, -1), self.poly):
+            sign = ('−' if value < 0 else '+') if text else ('−' if value < 0 else '')
+            term = ('%.3f' % abs(value)) + {0: '', 1: ' ' + variable, 2: ' %s²' % variable}[power]
+            text += (' %s ' % sign if text else sign) + term
+        return text
 
 
 def axis_statistics(table, axis, degree):
@@ -90,6 +100,18 @@ class Analysis(NamedTuple):
     def model_note(self):
         """Why there is no error model; '' if there is one."""
         return '' if self.model is not None else 'no error_model.yaml is written: %s' % self.no_model
+
+    def print_results(self, folder):
+        """Print mean error and standard deviation of both axes, what is left out, and the path of the report."""
+        for outlier in self.inputs.outliers:
+            print('left out of the analysis:', outlier, file=sys.stderr)
+        for name, axis, spread in (('z', self.z, self.z), ('x', self.x, self.x_variance)):
+            print('f(%s) = %s, largest variance %.5f m², standard deviation %.4f m' % (
+                name, axis.poly_text(name), spread.max_variance_m2, spread.max_sigma_m))
+        if self.model_note:
+            print('note:', self.model_note, file=sys.stderr)
+        print('detector: not measured, default values; ./run noise --recordings measures it')
+        print('report: %s' % (folder / 'report.html'))
 
 
 def analyse(inputs):

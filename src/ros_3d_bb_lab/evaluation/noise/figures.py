@@ -12,16 +12,6 @@ MANY_CLUSTERS = 12
 MEASURED, FITTED = '#0072b2', '#d55e00'  # different for all colour vision
 
 
-def polynomial_text(poly, variable):
-    """Format a polynomial in mathematical notation: −0.040 z² + 0.060 z + 0.008."""
-    text = ''
-    for power, value in zip(range(len(poly) - 1, -1, -1), poly):
-        sign = ('−' if value < 0 else '+') if text else ('−' if value < 0 else '')
-        term = ('%.3f' % abs(value)) + {0: '', 1: ' ' + variable, 2: ' %s²' % variable}[power]
-        text += (' %s ' % sign if text else sign) + term
-    return text
-
-
 def layout(path, complete):
     """View from above: true positions with the number of their measurements, and the estimates."""
     places_m, counts = np.unique(complete.truth_m, axis=0, return_counts=True)
@@ -64,7 +54,7 @@ def error_by_truth(path, axis, name):
                   label='mean ± one standard deviation')
     line_m = np.linspace(truth_m.min(), truth_m.max(), 100)
     axes.plot(line_m, np.polyval(axis.poly, line_m), color=FITTED,
-              label='f(%s) = %s' % (name.lower(), polynomial_text(axis.poly, name.lower())))
+              label='f(%s) = %s' % (name.lower(), axis.poly_text(name.lower())))
     _finish(figure, axes, path, 'true %s [m]' % name, '%s error [m]' % name)
 
 

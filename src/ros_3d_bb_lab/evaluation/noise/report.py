@@ -1,6 +1,5 @@
 """Output of the noise analysis: a folder with a report, its figures, a summary and an error model, and a short text."""
 import json
-import sys
 
 import numpy as np
 
@@ -8,8 +7,7 @@ from ros_3d_bb.estimation.error_model import write_error_model
 from ros_3d_bb.sessions.plausibility import position_text
 from ros_3d_bb_lab.evaluation.html_report import figure, heading, html_report, paragraph, table
 from ros_3d_bb_lab.evaluation.noise.analysis import LEAST_IN_CLUSTER, summary_of
-from ros_3d_bb_lab.evaluation.noise.figures import (error_by_truth, histograms, layout, polynomial_text, sigmas,
-                                                     variances)
+from ros_3d_bb_lab.evaluation.noise.figures import error_by_truth, histograms, layout, sigmas, variances
 from ros_3d_bb_lab.evaluation.noise.tables import LEAST_TO_TEST
 
 SIGNIFICANCE = 0.05  # of the normality test
@@ -40,24 +38,11 @@ def write_results(folder, analysis):
         model_path.unlink()
 
 
-def print_results(analysis, folder):
-    """Print mean error and standard deviation of both axes, what is left out, and the path of the report."""
-    for outlier in analysis.inputs.outliers:
-        print('left out of the analysis:', outlier, file=sys.stderr)
-    for name, axis, spread in (('z', analysis.z, analysis.z), ('x', analysis.x, analysis.x_variance)):
-        print('f(%s) = %s, largest variance %.5f m², standard deviation %.4f m' % (
-            name, polynomial_text(axis.poly, name), spread.max_variance_m2, spread.max_sigma_m))
-    if analysis.model_note:
-        print('note:', analysis.model_note, file=sys.stderr)
-    print('detector: not measured, default values; ./run noise --recordings measures it')
-    print('report: %s' % (folder / 'report.html'))
-
-
 def _summary(analysis, _drawn):
     model = analysis.model
     rows = [('measurements (mean error)', _count(analysis.x), _count(analysis.z)),
             ('measurements (variance)', _count(analysis.x_variance), _count(analysis.z)),
-            ('mean error f [m]', polynomial_text(analysis.x.poly, 'x'), polynomial_text(analysis.z.poly, 'z')),
+            ('mean error f [m]', analysis.x.poly_text('x'), analysis.z.poly_text('z')),
             ('largest variance σ² [m²]', '%.5f' % analysis.x_variance.max_variance_m2,
              '%.5f' % analysis.z.max_variance_m2),
             ('largest standard deviation σ [m]', '%.4f' % analysis.x_variance.max_sigma_m,
@@ -141,14 +126,14 @@ def _left_out(analysis, _drawn):
 def _z(analysis, drawn):
     return [heading('Errors in Z, the distance ahead'),
             paragraph('f(z) = %s metres, fitted to the mean errors of the clusters with equal weights.'
-                      % polynomial_text(analysis.z.poly, 'z')),
+                      % analysis.z.poly_text('z')),
             drawn('z_error.png', 'error in Z by true Z, and f(z)', error_by_truth, analysis.z, 'Z'), _cluster_table(analysis.z, 'Z', 'errors in Z by true Z'),
             drawn('z_variance.png', 'variance of the error in Z by true Z', variances, analysis.z, 'Z')]
 
 
 def _x(analysis, drawn):
     pieces = [heading('Errors in X, to the side'),
-              paragraph('f(x) = %s metres.' % polynomial_text(analysis.x.poly, 'x')),
+              paragraph('f(x) = %s metres.' % analysis.x.poly_text('x')),
               drawn('x_error.png', 'error in X by true X, and f(x)', error_by_truth, analysis.x, 'X'), _cluster_table(analysis.x, 'X', 'errors in X by true X')]
     if analysis.x_variance.poly != analysis.x.poly:
         pieces += [paragraph('The mean error is that of all measurements. Variance and distribution are those of the '
