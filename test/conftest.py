@@ -142,7 +142,7 @@ def folder(tmp_path):
 @pytest.fixture
 def document(folder):
     from ros_3d_bb_annotator.document import Document
-    return Document.open(folder)
+    return Document(folder)
 
 
 @pytest.fixture

@@ -16,13 +16,13 @@ def main(arguments=None):
     estimator = arguments.estimator or ESTIMATOR
     try:
         if arguments.export:
-            count = export(Document.open(arguments.session), arguments.export, estimator)
+            count = export(Document(arguments.session), arguments.export, estimator)
             print('%s: %d rows' % (arguments.export, count))
         elif arguments.analyse:
             analysis, folder = analyse(arguments.session, arguments.out, estimator)
             analysis.print_results(folder)
         else:
-            return _validate(Document.open(arguments.session))
+            return _validate(Document(arguments.session))
     except (ValueError, OSError) as error:
         print('annotator: %s' % error, file=sys.stderr)
         return 1

@@ -19,41 +19,31 @@ from ros_3d_bb_annotator.estimates import ESTIMATOR, Estimates
 
 
 class Document(object):
-    """Session that is being annotated. Use `Document.open` to create one.
+    """Session in a folder that is being annotated, opened without reading images. Raises SessionError.
 
     `measurements` are the Measurements in the order of the file; an index remains valid while the document is open.
     `progress` is (number of annotated or rejected measurements, number of all). `grid` are the Marks on the floor.
     `estimates` are the positions that the noise analysis uses; those stored in the session are the recorded ones.
     """
 
-    def __init__(self, folder, content):
-        self.folder, self.measurements = folder, ()
-        self._session = Session(*camera_of(content), frames=())
-        self.camera = self._session.camera
-        self._content, self._signature = {'frames': []}, None
-        self._undo, self._redo, self._annotated = [], [], []
+    def __init__(self, folder):
+        self.folder, self.measurements = os.path.abspath(str(folder)), ()
+        self._content, self._undo, self._redo, self._annotated = {'frames': []}, [], [], []
         self.estimates = Estimates(self)
-        self._update(content)
-
-    @classmethod
-    def open(cls, folder):
-        """Open the session in a folder, without reading images. Raises SessionError if it cannot be opened."""
-        folder = os.path.abspath(str(folder))
-        content = read_description(folder)
-        with session_errors(os.path.join(folder, FILE_NAME)):
-            return cls(folder, content)
+        content = read_description(self.folder)
+        with session_errors(os.path.join(self.folder, FILE_NAME)):
+            self._session = Session(*camera_of(content), frames=())
+            self._update(content)
+        self.camera = self._session.camera
 
     def refresh(self):
         """Read changes by other programs. Returns whether there were any. Raises SessionError."""
-        signature = _signature(self.folder)  # before reading, so that concurrent changes are detected next time
-        if self._signature == signature:
-            return False
-        before = self._content
         content = read_description(self.folder)
+        if content == self._content:
+            return False
         with session_errors(os.path.join(self.folder, FILE_NAME)):
             self._update(content)
-        self._signature = signature
-        return content != before
+        return True
 
     def color(self, index):
         """Read the colour image of a measurement, see `read_color`."""
@@ -226,7 +216,6 @@ class Document(object):
         except (OSError, ValueError) as error:
             raise SessionError('%s: cannot be saved (%s)' % (self.folder, getattr(error, 'strerror', error)))
         self._update(content)
-        self._signature = None  # another program may write before the next refresh
         return inverses
 
     def _update(self, content):
@@ -245,12 +234,3 @@ def _existing(measurement, folder):
     missing = [os.path.relpath(path, folder) for path in (measurement.color_path, measurement.depth_path)
                if path and not os.path.exists(path)]
     return measurement._replace(problem='there is no file %s' % ' and no file '.join(missing)) if missing else measurement
-
-
-def _signature(folder):
-    """File status that changes whenever a program writes the session."""
-    try:
-        status = os.stat(os.path.join(folder, FILE_NAME))
-        return status.st_mtime_ns, status.st_size, status.st_ino
-    except OSError:
-        return None

@@ -60,7 +60,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
     def open_session(self, folder):
         """Open the session in a folder, or show an error message. Returns whether it is open."""
         try:
-            document = Document.open(folder)
+            document = Document(folder)
         except (ValueError, OSError) as error:
             dialogs.show_error(self, 'The session cannot be opened', error)
             return False

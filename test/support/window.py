@@ -119,4 +119,4 @@ class Driver(object):
 
 def opened(folder):
     """The measurements of a session, as another program reads them."""
-    return Document.open(folder).measurements
+    return Document(folder).measurements

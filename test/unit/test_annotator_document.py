@@ -39,7 +39,7 @@ def test_truth_is_saved_immediately_and_read_by_benchmarks(document, folder):
     assert frames[1].truth_m == (0.1, None, 2.3) and frames[2].truth_m == (0.1, -0.05, 2.3)
     assert frames[2].boxes_px == (FAR_BOX, NEAR_BOX) and frames[2].estimate_m.tolist() == [0.7, 0.1, 3.0]
     assert frames[0].stamp_ns == 1616161616000000005 and frames[0].label == 'by the door'
-    assert Document.open(folder).measurements[2].truth_m == (0.1, -0.05, 2.3)
+    assert Document(folder).measurements[2].truth_m == (0.1, -0.05, 2.3)
 
 
 @settings(max_examples=25)
@@ -47,7 +47,7 @@ def test_truth_is_saved_immediately_and_read_by_benchmarks(document, folder):
                           st.integers(0, 3), st.integers(0, 1)), max_size=12))
 def test_after_any_edits_the_file_is_what_is_shown_and_undo_leads_back(tmp_path_factory, edits):
     folder = write_small_session(str(tmp_path_factory.mktemp('session')))
-    start, document = read_json(folder), Document.open(folder)
+    start, document = read_json(folder), Document(folder)
     for kind, index, number in edits:
         if kind in ('undo', 'redo'):
             getattr(document, kind)()
@@ -56,7 +56,7 @@ def test_after_any_edits_the_file_is_what_is_shown_and_undo_leads_back(tmp_path_
                 [index], 'no'), 'restore': lambda: document.restore(index),
              'person': lambda: document.choose_person(index, number)}[kind]()
     shown, saved = ([(one.truth_m, one.person, one.rejected) for one in source.measurements]
-                    for source in (document, Document.open(folder)))
+                    for source in (document, Document(folder)))
     assert shown == saved
     while document.can_undo:
         document.undo()
@@ -76,7 +76,7 @@ def test_measurements_added_by_a_viewer_are_kept_and_shown(document, folder):
 
 
 def test_two_annotators_keep_the_fields_of_each_other(document, folder):
-    other = Document.open(folder)
+    other = Document(folder)
     document.set_truths([0], 0.1, 2.0)
     other.draw_box(0, (1, 1, 30, 40))
     other.set_truths([1], 0.3, 2.2)
@@ -146,7 +146,7 @@ def test_truth_can_be_entered_for_a_box_that_cannot_be_estimated(document, folde
 def test_a_missing_image_is_named_and_other_measurements_can_be_annotated(folder):
     os.remove(os.path.join(folder, 'depth', 'm1.png'))
     os.remove(os.path.join(folder, 'color', 'm1.png'))
-    document = Document.open(folder)
+    document = Document(folder)
     assert [measurement.problem for measurement in document.measurements] == [
         None, 'there is no file color/m1.png and no file depth/m1.png', None, None]
     for read in (document.color, document.depth):
@@ -164,7 +164,7 @@ def test_a_missing_image_is_named_and_other_measurements_can_be_annotated(folder
     (lambda entry: entry.update(stamp='yesterday'), 'stamp is'), (lambda entry: entry.update(detections=5), 'int')])
 def test_an_invalid_entry_is_shown_with_its_fault(folder, break_it, problem):
     change_json(folder, lambda content: break_it(content['frames'][1]))
-    document = Document.open(folder)
+    document = Document(folder)
     assert problem in document.measurements[1].problem and document.measurements[1].state == 'new'
     assert problem in list(problems_of(document))[0]
     for edit in (lambda: document.color(1), lambda: document.set_truths([1], 0.1, 2.0)):
@@ -177,4 +177,4 @@ def test_an_invalid_entry_is_shown_with_its_fault(folder, break_it, problem):
 def test_a_session_with_an_invalid_grid_is_rejected(folder):
     change_json(folder, lambda content: content.update(grid=[{'name': 'A', 'x': float('nan'), 'z': 1}]))
     with pytest.raises(SessionError, match='frames.json'):
-        Document.open(folder)
+        Document(folder)

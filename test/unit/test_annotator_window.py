@@ -82,9 +82,9 @@ def test_marks_are_edited_in_a_dialog(drive, folder):
     labels = []
     drive.answer(add_incomplete_mark, lambda: drive.press((Qt.Key_G, CONTROL)))
     assert 'line 3' in labels[0]
-    assert Document.open(folder).grid == (Mark('A1', -0.5, 2.0), Mark('B1', 0, 2), Mark('B2', 0, 3))
+    assert Document(folder).grid == (Mark('A1', -0.5, 2.0), Mark('B1', 0, 2), Mark('B2', 0, 3))
     drive.press((Qt.Key_Z, CONTROL))
-    assert Document.open(folder).grid == (Mark('A1', -0.5, 2.0),)
+    assert Document(folder).grid == (Mark('A1', -0.5, 2.0),)
 
 
 def test_reject_asks_for_a_reason_and_restore_undoes_it(drive, folder):
