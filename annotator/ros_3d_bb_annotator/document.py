@@ -22,13 +22,14 @@ class Document(object):
     """Session in a folder that is being annotated, opened without reading images. Raises SessionError.
 
     `measurements` are the Measurements in the order of the file; an index remains valid while the document is open.
-    `progress` is (number of annotated or rejected measurements, number of all). `grid` are the Marks on the floor.
-    `estimates` are the positions that the noise analysis uses; those stored in the session are the recorded ones.
+    `undo_steps` and `redo_steps` are the edits that can be undone and redone. `progress` is (number of annotated or
+    rejected measurements, number of all). `grid` are the Marks on the floor. `estimates` are the positions that the noise
+    analysis uses; those stored in the session are the recorded ones.
     """
 
     def __init__(self, folder):
         self.folder, self.measurements = os.path.abspath(str(folder)), ()
-        self._content, self._undo, self._redo, self._annotated = {'frames': []}, [], [], []
+        self._content, self.undo_steps, self.redo_steps, self._annotated = {'frames': []}, [], [], []
         self.estimates = Estimates(self)
         content = read_description(self.folder)
         with session_errors(os.path.join(self.folder, FILE_NAME)):
@@ -60,10 +61,6 @@ class Document(object):
             return None
         dx_m, dz_m = (float(positions[measurement.person][axis] - measurement.truth_m[axis]) for axis in (0, 2))
         return dx_m, dz_m, float(np.hypot(dx_m, dz_m))
-
-    def is_implausible(self, index):
-        """Whether a truth of a measurement is an outlier among the known errors."""
-        return index in self.estimates.implausible()
 
     def person_at(self, index, x_m, z_m):
         """Detection that a true position belongs to: the one that the user selected, or the nearest one; None without.
@@ -155,21 +152,13 @@ class Document(object):
     def set_grid(self, marks):
         self._edit((None, {'grid': [mark_entry(mark) for mark in marks]}))
 
-    @property
-    def can_undo(self):
-        return bool(self._undo)
-
-    @property
-    def can_redo(self):
-        return bool(self._redo)
-
     def undo(self):
         """Undo the last edit. Returns the changed index, or None for the grid or no edit."""
-        return self._step(self._undo, self._redo)
+        return self._step(self.undo_steps, self.redo_steps)
 
     def redo(self):
         """Redo the last undone edit. Returns the same as `undo`."""
-        return self._step(self._redo, self._undo)
+        return self._step(self.redo_steps, self.undo_steps)
 
     def _changes_with_truth(self, index, truth_mm):
         """Changes that set the truth of the person at a position. It moves from a person who cannot be there, too."""
@@ -198,8 +187,8 @@ class Document(object):
             if name == '':
                 raise SessionError('measurement %d has no id, so its annotation cannot be saved' % index)
             edits.append(Edit(index, name, changed_fields))
-        self._undo.append(self._save(edits))
-        del self._redo[:]
+        self.undo_steps.append(self._save(edits))
+        del self.redo_steps[:]
 
     def _step(self, source, target):
         if not source:
@@ -233,4 +222,5 @@ def _existing(measurement, folder):
     """The measurement, with a problem if one of its files does not exist."""
     missing = [os.path.relpath(path, folder) for path in (measurement.color_path, measurement.depth_path)
                if path and not os.path.exists(path)]
-    return measurement._replace(problem='there is no file %s' % ' and no file '.join(missing)) if missing else measurement
+    problem = 'there is no file %s' % ' and no file '.join(missing) if missing else measurement.problem
+    return measurement._replace(problem=problem)

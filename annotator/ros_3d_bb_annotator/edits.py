@@ -59,8 +59,7 @@ class Edits(object):
                 self._window.pane.truth.begin()
 
     def draw_box(self, box_px, is_new):
-        """Add a box that was drawn by hand, or replace the selected one, and select it. The truth has the keyboard then.
-        """
+        """Add a box drawn by hand, or replace the selected one, and select it. The truth has the keyboard then."""
         window = self._window
         person = None if is_new else window.measurement.person
         if self._edit(lambda document: document.draw_box(window.current, box_px, person)):

@@ -114,10 +114,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
 
     def next_implausible(self):
         """Show the next measurement with an implausible truth."""
-        self._go_to_next(self.document.is_implausible, 'No implausible positions')
-
-    def go_to_truth(self):
-        self.pane.truth.begin()
+        self._go_to_next(lambda number: number in self.document.estimates.implausible(), 'No implausible positions')
 
     def after_edit(self):
         """Update the window from the document."""
@@ -172,8 +169,8 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self.progress.setValue(done)
         self.progress.setFormat('%d of %d done' % (done, count))
         measurement = self.measurement
-        self.actions['undo'].setEnabled(bool(self.document and self.document.can_undo))
-        self.actions['redo'].setEnabled(bool(self.document and self.document.can_redo))
+        self.actions['undo'].setEnabled(bool(self.document and self.document.undo_steps))
+        self.actions['redo'].setEnabled(bool(self.document and self.document.redo_steps))
         self.actions['clear_truth'].setEnabled(measurement is not None and measurement.truth_m is not None)
         self.actions['enter_for_label'].setEnabled(measurement is not None and bool(measurement.label))
         self.actions['delete_box'].setEnabled(measurement is not None and measurement.person is not None)

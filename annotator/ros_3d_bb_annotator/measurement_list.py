@@ -51,7 +51,7 @@ class MeasurementModel(QtCore.QAbstractTableModel):
         if measurement.problem is not None and measurement.rejected is None:
             return INVALID
         state = measurement.state
-        return IMPLAUSIBLE if state == ANNOTATED and self._document.is_implausible(row) else state
+        return IMPLAUSIBLE if state == ANNOTATED and row in self._document.estimates.implausible() else state
 
     def data(self, index, role=Qt.DisplayRole):
         row, column = index.row(), index.column()

@@ -79,7 +79,7 @@ class MeasurementPane(QtWidgets.QWidget):
         details = [text for text in (measurement.label, measurement.stamp_text and 'at %s s' % measurement.stamp_text,
                                      measurement.rejected and 'reason: %s' % measurement.rejected,
                                      measurement.problem) if text]
-        state = IMPLAUSIBLE if self._document.is_implausible(self._index) else measurement.state
+        state = IMPLAUSIBLE if self._index in self._document.estimates.implausible() else measurement.state
         self.header.setText(HEADER % (html.escape(measurement.id), COLORS[state].name(), state,
                                       html.escape(' · '.join(details))))
 

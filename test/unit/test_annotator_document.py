@@ -58,7 +58,7 @@ def test_after_any_edits_the_file_is_what_is_shown_and_undo_leads_back(tmp_path_
     shown, saved = ([(one.truth_m, one.person, one.rejected) for one in source.measurements]
                     for source in (document, Document(folder)))
     assert shown == saved
-    while document.can_undo:
+    while document.undo_steps:
         document.undo()
     assert read_json(folder) == start
 
@@ -93,7 +93,7 @@ def test_an_edit_that_cannot_be_saved_raises_an_error_and_changes_nothing(docume
     for edit in (lambda: document.set_truths([0], 0.1, 2.0), document.refresh):
         with pytest.raises(SessionError, match='frames.json|cannot be saved'):
             edit()
-    assert states(document) == ['new'] * 4 and not document.can_undo
+    assert states(document) == ['new'] * 4 and not document.undo_steps
     os.rename(folder, folder + '-gone')
     with pytest.raises(SessionError, match='cannot be saved'):
         document.set_truths([0], 0.1, 2.0)

@@ -55,7 +55,7 @@ def test_a_click_on_a_box_or_its_list_entry_selects_it(drive, folder, panel):
 def test_a_box_is_drawn_with_shift_and_drag_unless_it_is_tiny(drive, folder):
     view = drive.window.pane.images
     drive.drag(view, place_in(view, 20.5, 20.5), place_in(view, 22.5, 22.5), SHIFT)
-    assert len(drive.measurement(0).detections) == 2 and not drive.document.can_undo
+    assert len(drive.measurement(0).detections) == 2 and not drive.document.undo_steps
     drive.drag(view, place_in(view, 11.5, 5.5), place_in(view, 25.5, 43.5), SHIFT)
     drawn = opened(folder)[0].detections[2]
     assert drawn.box_px == (11, 5, 26, 44) and drawn.by_hand and opened(folder)[0].person == 2

@@ -127,14 +127,16 @@ def _z(analysis, drawn):
     return [heading('Errors in Z, the distance ahead'),
             paragraph('f(z) = %s metres, fitted to the mean errors of the clusters with equal weights.'
                       % analysis.z.poly_text('z')),
-            drawn('z_error.png', 'error in Z by true Z, and f(z)', error_by_truth, analysis.z, 'Z'), _cluster_table(analysis.z, 'Z', 'errors in Z by true Z'),
+            drawn('z_error.png', 'error in Z by true Z, and f(z)', error_by_truth, analysis.z, 'Z'),
+            _cluster_table(analysis.z, 'Z', 'errors in Z by true Z'),
             drawn('z_variance.png', 'variance of the error in Z by true Z', variances, analysis.z, 'Z')]
 
 
 def _x(analysis, drawn):
     pieces = [heading('Errors in X, to the side'),
               paragraph('f(x) = %s metres.' % analysis.x.poly_text('x')),
-              drawn('x_error.png', 'error in X by true X, and f(x)', error_by_truth, analysis.x, 'X'), _cluster_table(analysis.x, 'X', 'errors in X by true X')]
+              drawn('x_error.png', 'error in X by true X, and f(x)', error_by_truth, analysis.x, 'X'),
+              _cluster_table(analysis.x, 'X', 'errors in X by true X')]
     if analysis.x_variance.poly != analysis.x.poly:
         pieces += [paragraph('The mean error is that of all measurements. Variance and distribution are those of the '
                              '%s measurements of people who are not truncated by the image border.'
@@ -158,19 +160,14 @@ def _distributions(analysis, drawn):
 
 
 def _model(analysis, drawn):
-    if analysis.model is None:
-        pieces = [paragraph('%s%s.' % (analysis.model_note[:1].upper(), analysis.model_note[1:]))]
-    else:
-        pieces = _model_pieces(analysis, drawn)
-    return [heading('Error model and its validation')] + pieces
-
-
-def _model_pieces(analysis, drawn):
-    model = analysis.model
+    model, title = analysis.model, heading('Error model and its validation')
+    if model is None:
+        return [title, paragraph('%s%s.' % (analysis.model_note[:1].upper(), analysis.model_note[1:]))]
     scores, limits = model.cross_validated, model.measured_range
     z_bias = ' '.join('%+.4f%s' % (value, {0: '', 1: ' z', 2: ' z²', 3: ' z³'}[len(model.z_bias) - 1 - number])
                       for number, value in enumerate(model.z_bias))
     return [
+        title,
         paragraph('error_model.yaml, in the folder of this report, is for bbox3d_node (error_model:=FILE), which '
                   'removes the bias and sets the covariance of positions. It is fitted to the %d measurements with '
                   'X and Z, at %d positions with equal weights. Its number of coefficients was selected by '

@@ -42,7 +42,7 @@ class MeasurementTable(NamedTuple):
 
     def complete(self):
         """Select the measurements with x and z."""
-        return self._part(self._is_complete())
+        return self._part(np.isfinite(np.c_[self.measured_m[:, [0, 2]], self.truth_m]).all(axis=1))
 
     def whole(self):
         """Select the measurements of people that are not truncated."""
@@ -58,9 +58,6 @@ class MeasurementTable(NamedTuple):
         found = set((outlier.name, *outlier.truth_m.tolist()) for outlier in outliers)
         return self._part(np.array([(name, *truth_m) not in found
                                     for name, truth_m in zip(self.ids, self.truth_m.tolist())]))
-
-    def _is_complete(self):
-        return np.isfinite(np.concatenate((self.measured_m[:, [0, 2]], self.truth_m), axis=1)).all(axis=1)
 
     def _part(self, mask):
         return self._replace(measured_m=self.measured_m[mask], truth_m=self.truth_m[mask], cut=self.cut[mask],
