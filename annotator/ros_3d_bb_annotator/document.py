@@ -23,8 +23,8 @@ class Document(object):
 
     `measurements` are the Measurements in the order of the file; an index remains valid while the document is open.
     `undo_steps` and `redo_steps` are the edits that can be undone and redone. `progress` is (number of annotated or
-    rejected measurements, number of all). `grid` are the Marks on the floor. `estimates` are the positions that the noise
-    analysis uses; those stored in the session are the recorded ones.
+    rejected measurements, number of all). `grid` are the Marks on the floor. `estimates` are the positions that the
+    noise analysis uses; those stored in the session are the recorded ones.
     """
 
     def __init__(self, folder):
