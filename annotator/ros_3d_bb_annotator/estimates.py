@@ -80,9 +80,8 @@ class Estimates(object):
 
     def _position(self, measurement, depth):
         """Position (3,) of the selected person of a measurement, or None."""
-        with contextlib.suppress(ValueError):  # an empty box
-            box = measurement.estimate(depth, self._document.camera, estimator_named(ESTIMATOR))
-            return None if box is None else box.center_m
+        box = measurement.estimate(depth, self._document.camera, estimator_named(ESTIMATOR))
+        return None if box is None else box.center_m
 
     def people(self, estimator=ESTIMATOR):
         """Yield index, detection, estimate (3,) and truth (x, y, z) of the annotated people with a known estimate.

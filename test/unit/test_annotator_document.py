@@ -132,6 +132,24 @@ def test_a_box_drawn_by_hand_replaces_that_of_the_same_person(document, folder):
     assert read_session(folder).frames[0].boxes_px == (NEAR_BOX, FAR_BOX)
 
 
+def test_the_truth_stays_with_its_person_when_boxes_are_drawn_and_deleted(document):
+    near_m, far_m = (-0.47, None, 2.0), (0.7, None, 3.0)
+    document.set_truths([0], -0.47, 2.0)
+    document.draw_box(0, (12, 6, 28, 44))  # of the same person
+    assert document.measurements[0].truths == {2: near_m}
+    document.draw_box(0, (30, 5, 38, 20))  # of another one
+    assert document.measurements[0].person == 3 and document.measurements[0].truths == {2: near_m}
+    wall_m = document.estimates.of(0)[3][2]
+    document.draw_box(0, FAR_BOX, 3)
+    assert len(document.measurements[0].detections) == 4 and document.estimates.of(0)[3][2] < wall_m - 0.5
+    document.set_truths([0], 0.7, 3.0)
+    assert document.measurements[0].truths == {2: near_m, 3: far_m}
+    document.delete_box(0)
+    assert document.measurements[0].truths == {2: near_m} and document.measurements[0].person == 0
+    document.set_truths([0], 0.7, 3.0)  # nobody is selected any more
+    assert document.measurements[0].truths == {1: far_m, 2: near_m}
+
+
 @pytest.mark.parametrize('break_it', [
     lambda document: os.remove(document.measurements[0].depth_path),
     lambda document: cv2.imwrite(document.measurements[0].depth_path, np.zeros((48, 64), np.uint16))])

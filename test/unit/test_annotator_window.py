@@ -24,6 +24,8 @@ def test_the_error_of_a_typed_truth_is_shown_and_enter_saves_it(drive, folder):
     assert 'X −29 mm, Z +40 mm' in drive.window.last_entry.text()
     drive.press('-0,5 m', Qt.Key_Tab, '2.1m', Qt.Key_Tab, '-30', Qt.Key_Return)
     assert opened(folder)[1].truth_m == (-0.5, -0.03, 2.1) and drive.window.current == 2
+    drive.press((Qt.Key_Z, CONTROL))
+    assert opened(folder)[1].truth_m is None and drive.window.current == 1
 
 
 @pytest.mark.parametrize('x, z, problem, field', [

@@ -107,10 +107,7 @@ class Measurement(NamedTuple):
 
     def estimate(self, depth, camera, estimator):
         """Estimate the Box3D of the selected person, considering the boxes of other people; None if there is none."""
-        boxes_px = self.boxes_px
-        if any(x1 >= x2 or y1 >= y2 for x1, y1, x2, y2 in boxes_px[:1]):
-            raise SessionError('box (%d, %d, %d, %d) is empty or reversed' % boxes_px[0])
-        boxes = estimate_boxes(depth, boxes_px, camera, estimator, self.level_from_camera)
+        boxes = estimate_boxes(depth, self.boxes_px, camera, estimator, self.level_from_camera)
         return plausible(boxes[0]) if boxes else None
 
     @property
