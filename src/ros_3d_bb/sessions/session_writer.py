@@ -122,7 +122,7 @@ def _check_camera(folder, content, snapshot, scale_m):
 
 
 def _next_id(entries, stamp_ns):
-    matches = [ID_FORMAT.match(str(entry['id'])) for entry in entries]
+    matches = [ID_FORMAT.match(str(entry.get('id'))) for entry in entries if isinstance(entry, dict)]
     numbers = [int(match.group(1)) for match in matches if match]
     return '%05d_%d_%09d' % ((max([len(entries)] + numbers) + 1,) + divmod(stamp_ns, NS))
 
