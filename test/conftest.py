@@ -106,7 +106,7 @@ def camera_bag(session_folder, tmp_path_factory):
     from ros_3d_bb.bags.bag_writer import session_images, write_bag
     from ros_3d_bb.sessions.session_reader import read_session
     session = read_session(session_folder)
-    nearest = sorted(session.frames, key=lambda frame: abs(frame.truth_m[1] - 2.4) + abs(frame.truth_m[0]))
+    nearest = sorted(session.frames, key=lambda frame: abs(frame.truth_m[2] - 2.4) + abs(frame.truth_m[0]))
     path = str(tmp_path_factory.mktemp('camera') / 'camera.bag')
     write_bag(session_images(session._replace(frames=nearest[:5] * 8), 2.0, with_boxes=True), path)
     return path
@@ -142,7 +142,7 @@ def folder(tmp_path):
 @pytest.fixture
 def document(folder):
     from ros_3d_bb_annotator.document import Document
-    return Document.open(folder)
+    return Document(folder)
 
 
 @pytest.fixture

@@ -29,7 +29,7 @@ MENUS = (  # of entries: method that it calls, text, and shortcuts
         ('next_new', 'Next measurement to &do', 'Ctrl+N'),
         ('next_implausible', 'Next &implausible position', 'Ctrl+I'),
         LINE,
-        ('go_to_truth', 'Focus the &true position', 'F4'))),
+        ('begin', 'Focus the &true position', 'F4'))),
     ('&Person', tuple(
         ('choose_%d' % number, 'Box &%d' % number, '%d' % number, 'Alt+%d' % number)
         for number in range(1, 10))),

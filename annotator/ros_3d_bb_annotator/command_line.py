@@ -2,8 +2,9 @@
 import argparse
 import sys
 
-from ros_3d_bb_annotator.document import ESTIMATOR, Document
-from ros_3d_bb_annotator.export import export
+from ros_3d_bb_annotator.document import Document
+from ros_3d_bb_annotator.estimates import ESTIMATOR
+from ros_3d_bb_annotator.export import analyse, export
 from ros_3d_bb_annotator.validation import problems_of
 
 
@@ -12,15 +13,16 @@ def main(arguments=None):
     arguments = _arguments(arguments)
     if not (arguments.export or arguments.analyse or arguments.validate):
         return _show(arguments.session)
+    estimator = arguments.estimator or ESTIMATOR
     try:
-        document = Document.open(arguments.session)
         if arguments.export:
-            count = export(document, arguments.export, arguments.estimator or ESTIMATOR)
+            count = export(Document(arguments.session), arguments.export, estimator)
             print('%s: %d rows' % (arguments.export, count))
         elif arguments.analyse:
-            _analyse(document, arguments)
+            analysis, folder = analyse(arguments.session, arguments.out, estimator)
+            analysis.print_results(folder)
         else:
-            return _validate(document)
+            return _validate(Document(arguments.session))
     except (ValueError, OSError) as error:
         print('annotator: %s' % error, file=sys.stderr)
         return 1
@@ -35,17 +37,6 @@ def _show(folder):
               'work without it' % error, file=sys.stderr)
         return 1
     return run_window(folder)
-
-
-def _analyse(document, arguments):
-    from ros_3d_bb_annotator.analysis import analyse  # imports scipy and matplotlib
-    analysis, text, folder = analyse(document, arguments.out, arguments.estimator or ESTIMATOR)
-    for outlier in analysis.inputs.outliers:
-        print('annotator: left out of the analysis:', outlier, file=sys.stderr)
-    print(text)
-    if analysis.model_note:
-        print('annotator: note: %s' % analysis.model_note, file=sys.stderr)
-    print('report: %s' % (folder / 'report.html'))
 
 
 def _validate(document):

@@ -3,61 +3,48 @@
 Positions are in the camera's optical frame, in metres. Only the edited fields of measurements are written, so a viewer
 can add measurements to the same session concurrently.
 """
-import contextlib
 import os
 
 import numpy as np
 
 from ros_3d_bb.camera.images import FARTHEST_M
-from ros_3d_bb.estimation.box3d import plausible
-from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
-from ros_3d_bb.sessions.session_reader import (FILE_NAME, Session, SessionError, boxes_of_others, camera_of, read_color,
-                                               read_depth, read_description, session_errors)
+from ros_3d_bb.estimation.box3d_estimator import estimator_named
+from ros_3d_bb.sessions.session_reader import (ANNOTATED, FILE_NAME, RecordedDetection, Session, SessionError,
+                                               boxes_of_others, camera_of, measurement_of, read_color, read_depth,
+                                               read_description, session_errors)
 from ros_3d_bb.sessions.session_writer import locked_update
-from ros_3d_bb_annotator.entries import (Edit, changed, detections_of, drawn, entry_at, grid_of, mark_entry,
-                                         truth_entry, with_detections, with_person)
-from ros_3d_bb_annotator.estimates import Estimates
-from ros_3d_bb_annotator.measurement import ANNOTATED, measurement_of
-
-ESTIMATOR = 'foreground'  # the default of bbox3d_node
+from ros_3d_bb_annotator.entries import (Edit, changed, changes_of, drawn, entry_at, grid_of, mark_entry, people_of,
+                                         truth_entry)
+from ros_3d_bb_annotator.estimates import ESTIMATOR, Estimates
 
 
 class Document(object):
-    """Session that is being annotated. Use `Document.open` to create one.
+    """Session in a folder that is being annotated, opened without reading images. Raises SessionError.
 
-    `measurements` are EditedMeasurements in the order of the file; an index remains valid while the document is open.
-    `progress` is (number of annotated or rejected measurements, number of all). `grid` are the Marks on the floor.
-    `estimates` are the positions that the noise analysis uses; those stored in the session are the recorded ones.
+    `measurements` are the Measurements in the order of the file; an index remains valid while the document is open.
+    `undo_steps` and `redo_steps` are the edits that can be undone and redone. `progress` is (number of annotated or
+    rejected measurements, number of all). `grid` are the Marks on the floor. `estimates` are the positions that the
+    noise analysis uses; those stored in the session are the recorded ones.
     """
 
-    def __init__(self, folder, content):
-        self.folder, self.measurements = folder, ()
-        self._session = Session(*camera_of(content), frames=())
-        self.camera = self._session.camera
-        self._content, self._signature = {'frames': []}, None
-        self._undo, self._redo, self._annotated = [], [], []
+    def __init__(self, folder):
+        self.folder, self.measurements = os.path.abspath(str(folder)), ()
+        self._content, self.undo_steps, self.redo_steps, self._annotated = {'frames': []}, [], [], []
         self.estimates = Estimates(self)
-        self._update(content)
-
-    @classmethod
-    def open(cls, folder):
-        """Open the session in a folder, without reading images. Raises SessionError if it cannot be opened."""
-        folder = os.path.abspath(str(folder))
-        content = read_description(folder)
-        with session_errors(os.path.join(folder, FILE_NAME)):
-            return cls(folder, content)
+        content = read_description(self.folder)
+        with session_errors(os.path.join(self.folder, FILE_NAME)):
+            self._session = Session(*camera_of(content), frames=())
+            self._update(content)
+        self.camera = self._session.camera
 
     def refresh(self):
         """Read changes by other programs. Returns whether there were any. Raises SessionError."""
-        signature = _signature(self.folder)  # before reading, so that concurrent changes are detected next time
-        if self._signature == signature:
-            return False
-        before = self._content
         content = read_description(self.folder)
+        if content == self._content:
+            return False
         with session_errors(os.path.join(self.folder, FILE_NAME)):
             self._update(content)
-        self._signature = signature
-        return content != before
+        return True
 
     def color(self, index):
         """Read the colour image of a measurement, see `read_color`."""
@@ -67,35 +54,6 @@ class Document(object):
         """Read the depth image of a measurement, see `read_depth`."""
         return read_depth(self._usable(index), self._session)
 
-    def positions(self, index, depth=None):
-        """Yield the estimated position (3,) of each detection, or None; see `Estimates`. Reads depth if not given."""
-        detections = self.measurements[index].detections
-        with contextlib.suppress(ValueError):
-            depth = self.depth(index) if depth is None else depth
-        for detection in detections:
-            box = None
-            if depth is not None and detection.box_px is not None:
-                with contextlib.suppress(ValueError):  # an empty box
-                    box = self.estimated(index, detection.box_px, depth)
-            yield None if box is None else box.center_m
-
-    def estimated(self, index, box_px, depth=None):
-        """Estimate the Box3D of a 2D box (x1, y1, x2, y2) in a measurement, considering the boxes of other people.
-
-        Returns None if there is not enough depth. Raises ValueError if the depth cannot be read, or the box is empty.
-        """
-        x1, y1, x2, y2 = box_px = tuple(int(edge) for edge in box_px)
-        if x1 >= x2 or y1 >= y2:
-            raise ValueError('box (%d, %d, %d, %d) is empty or reversed' % box_px)
-        detections = self.measurements[index].detections
-        others_px = [detection.box_px for detection in detections if detection.box_px not in (None, box_px)]
-        if not any(detection.box_px == box_px and not detection.by_hand for detection in detections):
-            others_px = boxes_of_others(box_px, others_px)  # a box by hand replaces those of the same person
-        depth = self.depth(index) if depth is None else depth
-        boxes = estimate_boxes(depth, [box_px] + list(others_px), self.camera, estimator_named(ESTIMATOR),
-                               level_rotation(self.measurements[index].up))
-        return plausible(boxes[0])
-
     def known_errors(self, index):
         """Estimate minus truth (x, z, distance) of the selected person, metres; None if missing or not yet computed."""
         measurement, positions = self.measurements[index], self.estimates.known(index)
@@ -103,17 +61,6 @@ class Document(object):
             return None
         dx_m, dz_m = (float(positions[measurement.person][axis] - measurement.truth_m[axis]) for axis in (0, 2))
         return dx_m, dz_m, float(np.hypot(dx_m, dz_m))
-
-    def outliers(self):
-        """Implausible truths, as (index, detection, Outlier). Computes missing estimates."""
-        for index in list(self.estimates.missing()):
-            self.estimates.of(index)
-        return [(index, person, self.estimates.outlier(index, person))
-                for index, people in sorted(self.estimates.implausible().items()) for person in people]
-
-    def is_implausible(self, index):
-        """Whether a truth of a measurement is an outlier among the known errors."""
-        return index in self.estimates.implausible()
 
     def person_at(self, index, x_m, z_m):
         """Detection that a true position belongs to: the one that the user selected, or the nearest one; None without.
@@ -161,40 +108,37 @@ class Document(object):
         if not 0 <= person < count:
             raise ValueError('detection %d does not exist; there are %d detections' % (person, count))
         entry = self._content['frames'][index]
-        self._edit((index, with_person(entry, detections_of(entry), int(person))))
+        self._edit((index, changes_of(entry, people_of(entry), int(person))))
 
-    def add_box(self, index, box_px):
-        """Add a box (x1, y1, x2, y2) drawn by hand, and select it. Returns its estimate as `estimated`.
+    def draw_box(self, index, box_px, person=None):
+        """Replace the selected detection by a box (x1, y1, x2, y2) drawn by hand, or add the box, and select it.
 
-        The truth of the selected person becomes that of the new box, unless that person is another one.
+        The truth of the selected person becomes that of the box, unless a new box is that of another person.
         """
-        box_px, box = self._drawn(index, box_px)
-        entry, measurement = self._content['frames'][index], self.measurements[index]
-        detections = detections_of(entry) + [drawn(box_px, box)]
-        person_px = None if measurement.person is None else measurement.detections[measurement.person].box_px
-        is_other = person_px is not None and boxes_of_others(box_px, [person_px])
-        changes = with_person(entry, detections, len(detections) - 1) if is_other else {'person': len(detections) - 1}
-        self._edit((index, dict(with_detections(detections), **changes)))
-        return box
+        measurement, entry = self.measurements[index], self._content['frames'][index]
+        x1, y1, x2, y2 = (int(round(edge)) for edge in box_px)
+        box_px = max(x1, 0), max(y1, 0), min(x2, self.camera.width), min(y2, self.camera.height)
+        others = tuple(other for number, other in enumerate(measurement.detections) if number != person)
+        box = measurement._replace(
+            detections=others + (RecordedDetection(box_px, None, by_hand=True),), person=len(others)
+        ).estimate(self.depth(index), self.camera, estimator_named(ESTIMATOR))
 
-    def replace_box(self, index, box_px):
-        """Replace the selected box by (x1, y1, x2, y2), drawn by hand. Returns its estimate as `estimated`."""
-        person = self.measurements[index].person
-        detections = detections_of(self._content['frames'][index])
-        box_px, box = self._drawn(index, box_px)
-        detections[person] = drawn(box_px, box)
-        self._edit((index, dict(with_detections(detections), person=person)))
-        return box
+        people, detection, selected_px = people_of(entry), drawn(box_px, box), measurement.boxes_px[:1]
+        if person is not None or not (selected_px and boxes_of_others(box_px, selected_px)):
+            truth_mm = people[measurement.person].pop('truth_mm', None) if people else entry.get('truth_mm')
+            detection.update({} if truth_mm is None else {'truth_mm': truth_mm})
+        person = len(people) if person is None else person
+        people[person:person + 1] = [detection]
+        self._edit((index, changes_of(entry, people, person)))
 
     def delete_box(self, index):
         """Delete the selected box and its truth."""
-        measurement = self.measurements[index]
+        measurement, entry = self.measurements[index], self._content['frames'][index]
         if measurement.person is None:
             raise ValueError('measurement %s has no box' % measurement.id)
-        detections = detections_of(self._content['frames'][index])
-        del detections[measurement.person]
-        self._edit((index, dict(with_detections(detections), person=None,
-                                truth_mm=detections[0].pop('truth_mm', None) if detections else None)))
+        people = people_of(entry)
+        del people[measurement.person]
+        self._edit((index, changes_of(entry, people, None)))
 
     def reject(self, indices, reason):
         """Reject measurements, which is undone in one step."""
@@ -208,40 +152,26 @@ class Document(object):
     def set_grid(self, marks):
         self._edit((None, {'grid': [mark_entry(mark) for mark in marks]}))
 
-    @property
-    def can_undo(self):
-        return bool(self._undo)
-
-    @property
-    def can_redo(self):
-        return bool(self._redo)
-
     def undo(self):
         """Undo the last edit. Returns the changed index, or None for the grid or no edit."""
-        return self._step(self._undo, self._redo)
+        return self._step(self.undo_steps, self.redo_steps)
 
     def redo(self):
         """Redo the last undone edit. Returns the same as `undo`."""
-        return self._step(self._redo, self._undo)
-
-    def _drawn(self, index, box_px):
-        """Clip a box to the image. Returns it and its estimate."""
-        x1, y1, x2, y2 = (int(round(edge)) for edge in box_px)
-        box_px = max(x1, 0), max(y1, 0), min(x2, self.camera.width), min(y2, self.camera.height)
-        return box_px, self.estimated(index, box_px)
+        return self._step(self.redo_steps, self.undo_steps)
 
     def _changes_with_truth(self, index, truth_mm):
         """Changes that set the truth of the person at a position. It moves from a person who cannot be there, too."""
         self._usable(index)
         entry = self._content['frames'][index]
-        person = self.person_at(index, truth_mm['x'] / 1000, truth_mm['z'] / 1000)
-        detections = detections_of(entry)
-        changes = {} if person is None else with_person(entry, detections, person)
-        detections = changes.get('detections', detections)
-        if any(detection.get('truth_mm') == truth_mm for detection in detections):
-            changes.update(with_detections([{key: value for key, value in detection.items()
-                                             if (key, value) != ('truth_mm', truth_mm)} for detection in detections]))
-        return dict(changes, truth_mm=truth_mm, rejected=None)
+        person, people = self.person_at(index, truth_mm['x'] / 1000, truth_mm['z'] / 1000), people_of(entry)
+        if person is None:
+            return {'truth_mm': truth_mm, 'rejected': None}
+        for other in people:
+            if other.get('truth_mm') == truth_mm:
+                del other['truth_mm']
+        people[person]['truth_mm'] = truth_mm
+        return dict(changes_of(entry, people, person), rejected=None)
 
     def _usable(self, index):
         measurement = self.measurements[index]
@@ -257,8 +187,8 @@ class Document(object):
             if name == '':
                 raise SessionError('measurement %d has no id, so its annotation cannot be saved' % index)
             edits.append(Edit(index, name, changed_fields))
-        self._undo.append(self._save(edits))
-        del self._redo[:]
+        self.undo_steps.append(self._save(edits))
+        del self.redo_steps[:]
 
     def _step(self, source, target):
         if not source:
@@ -275,7 +205,6 @@ class Document(object):
         except (OSError, ValueError) as error:
             raise SessionError('%s: cannot be saved (%s)' % (self.folder, getattr(error, 'strerror', error)))
         self._update(content)
-        self._signature = None  # another program may write before the next refresh
         return inverses
 
     def _update(self, content):
@@ -283,16 +212,15 @@ class Document(object):
         frames, old = content['frames'], self._content['frames']
         self.measurements = tuple(
             self.measurements[index] if index < len(old) and old[index] == entry
-            else measurement_of(self.folder, entry) for index, entry in enumerate(frames))
+            else _existing(measurement_of(self.folder, entry), self.folder) for index, entry in enumerate(frames))
         self.grid, self._content = grid_of(content), content
         self.progress = sum(measurement.is_done for measurement in self.measurements), len(self.measurements)
         self.estimates.update()
 
 
-def _signature(folder):
-    """File status that changes whenever a program writes the session."""
-    try:
-        status = os.stat(os.path.join(folder, FILE_NAME))
-        return status.st_mtime_ns, status.st_size, status.st_ino
-    except OSError:
-        return None
+def _existing(measurement, folder):
+    """The measurement, with a problem if one of its files does not exist."""
+    missing = [os.path.relpath(path, folder) for path in (measurement.color_path, measurement.depth_path)
+               if path and not os.path.exists(path)]
+    problem = 'there is no file %s' % ' and no file '.join(missing) if missing else measurement.problem
+    return measurement._replace(problem=problem)

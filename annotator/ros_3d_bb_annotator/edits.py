@@ -22,30 +22,18 @@ class Edits(object):
     def enter_for_label(self):
         """Set the typed or offered truth of all measurements with the current label that are not done."""
         window = self._window
-        if not window.measurement.label:
-            window.pane.truth.show_problem('The measurement has no label')
-            return
-        try:
-            truth_m = window.pane.truth.read()
-        except ValueError as error:
-            window.pane.truth.show_problem(str(error))
-            return
-        self._enter_truth([index for index, other in enumerate(window.document.measurements)
-                           if index == window.current or (other.label == window.measurement.label and not other.is_done
-                                                          and other.detections)], truth_m)
+        self._enter_read(window.pane.truth.read, [
+            index for index, other in enumerate(window.document.measurements)
+            if index == window.current or (other.label == window.measurement.label and not other.is_done
+                                           and other.detections)])
 
     def same_as_last(self):
         """Set the truth of the last annotated measurement, and go to the next measurement."""
-        try:
-            truth_m = self._window.document.last_truth(self._window.current)
-        except ValueError as error:
-            self._window.pane.truth.show_problem(str(error))
-            return
-        self._enter_truth(self._window.selection, truth_m)
+        self._enter_read(lambda: self._window.document.last_truth(self._window.current), self._window.selection)
 
     def clear_truth(self):
         self._window.pane.truth.forget_typed()
-        self._edit(Document.clear_truth)
+        self._edit(lambda document: document.clear_truth(self._window.current))
         self._window.pane.truth.begin()
 
     def ask_reject(self):
@@ -56,7 +44,7 @@ class Edits(object):
             self._enter(lambda document: document.reject(indices, reason), '%d rejected' % len(indices))
 
     def restore(self):
-        self._edit(Document.restore)
+        self._edit(lambda document: document.restore(self._window.current))
 
     def choose_person(self, person):
         """Select the box of the person by its index."""
@@ -66,39 +54,43 @@ class Edits(object):
         if person >= len(measurement.detections):
             self._window.statusBar().showMessage('There is no box %d' % (person + 1))
         else:
-            self._edit(Document.choose_person, person)
+            self._edit(lambda document: document.choose_person(self._window.current, person))
             if self._window.pane.truth.has_keyboard():
                 self._window.pane.truth.begin()
 
-    def add_box(self, box_px):
-        """Add a box that was drawn by hand, and select it. The truth has the keyboard then."""
-        self._change_box(Document.add_box, box_px)
-
-    def replace_box(self, box_px):
-        """Replace the selected box. The truth has the keyboard then."""
-        self._change_box(Document.replace_box, box_px)
+    def draw_box(self, box_px, is_new):
+        """Add a box drawn by hand, or replace the selected one, and select it. The truth has the keyboard then."""
+        window = self._window
+        person = None if is_new else window.measurement.person
+        if self._edit(lambda document: document.draw_box(window.current, box_px, person)):
+            position_m = window.document.estimates.of(window.current)[window.measurement.person]
+            window.statusBar().showMessage('The box is selected' if position_m is not None else
+                                           'The box has not enough depth for an estimate')
+            window.pane.truth.begin()
 
     def delete_box(self):
-        self._edit(Document.delete_box)
+        self._edit(lambda document: document.delete_box(self._window.current))
 
     def undo(self):
-        self._step(Document.undo)
+        self._edit(Document.undo)
 
     def redo(self):
-        self._step(Document.redo)
+        self._edit(Document.redo)
 
     def edit_marks(self):
         document = self._window.document
         marks = dialogs.ask_marks(self._window, document.grid)
-        if marks != document.grid and self._succeeds(lambda: document.set_grid(marks)):
-            self._show(self._window.current)
+        if marks != document.grid:
+            self._edit(lambda document: document.set_grid(marks))
 
-    def _change_box(self, edit, box_px):
-        if self._edit(edit, box_px):
-            position_m = self._window.document.estimates.of(self._window.current)[self._window.measurement.person]
-            self._window.statusBar().showMessage('The box is selected' if position_m is not None else
-                                                 'The box has not enough depth for an estimate')
-            self._window.pane.truth.begin()
+    def _enter_read(self, read, indices):
+        """Set the truth that `read()` returns, or show why it raises ValueError."""
+        try:
+            truth_m = read()
+        except ValueError as error:
+            self._window.pane.truth.show_problem(str(error))
+        else:
+            self._enter_truth(indices, truth_m)
 
     def _enter_truth(self, indices, truth_m):
         """Set a truth (x, y, z) of measurements. The user is asked about those where it is implausible."""
@@ -119,39 +111,29 @@ class Edits(object):
     def _enter(self, edit, text):
         """Apply an edit of the document that completes measurements. `text` describes it; empty: the error does."""
         window, index = self._window, self._window.current
-        if self._edit(lambda document, _index: edit(document)):
+        if self._edit(edit):
             window.last_entry.setText('<b>%s</b>: %s' % (
                 window.measurement.id, text or error_text(window.document.known_errors(index))))
             window.next_new()
 
-    def _edit(self, edit, *values):
-        """Apply a method of Document to the current measurement, and show it. Returns whether it succeeded."""
+    def _edit(self, edit):
+        """Apply `edit(document)`, and show the measurement whose index it returns, or the current one.
+
+        Returns whether it succeeded.
+        """
         window = self._window
-        done = window.current is not None and self._succeeds(lambda: edit(window.document, window.current, *values))
-        if done:
-            self._show(window.current)
-        return done
-
-    def _step(self, step):
-        indices = []
-        if self._succeeds(lambda: indices.append(step(self._window.document))):
-            self._show(self._window.current if indices[0] is None else indices[0])
-
-    def _show(self, index):
-        """Show the result of an edit instead of that of the previous one."""
-        self._window.statusBar().clearMessage()
-        self._window.last_entry.clear()
-        self._window.after_edit()
-        if index is not None:
-            self._window.show_measurement(index)
-
-    def _succeeds(self, edit):
-        """Apply an edit. Returns whether it succeeded."""
         try:
-            edit()
-            return True
+            index = edit(window.document)
         except (SessionError, OSError) as error:
-            dialogs.show_error(self._window, 'The edit was not saved', error)
+            dialogs.show_error(window, 'The edit was not saved', error)
+            return False
         except ValueError as error:
-            self._window.pane.truth.show_problem(str(error))
-        return False
+            window.pane.truth.show_problem(str(error))
+            return False
+        window.statusBar().clearMessage()
+        window.last_entry.clear()
+        window.after_edit()
+        index = window.current if index is None else index
+        if index is not None:
+            window.show_measurement(index)
+        return True

@@ -6,7 +6,7 @@ import numpy as np
 
 from ros_3d_bb.sessions.session_reader import SessionError
 from ros_3d_bb.sessions.session_writer import box_entry
-from ros_3d_bb_annotator.measurement import Mark
+from ros_3d_bb_annotator.marks import Mark
 
 DIGITS = 3  # micrometres: negligible rounding that avoids values such as 1229.9999999999998
 
@@ -47,20 +47,22 @@ def detections_of(entry):
     return [recorded] if recorded else []
 
 
-def with_person(entry, detections, person):
-    """Changes of an entry that select a detection. Its truth is stored in the entry, others in their detections."""
-    old, detections = int(entry.get('person', 0)), [dict(detection) for detection in detections]
-    if person == old or not detections:
-        return {'person': person}
-    truth_mm = detections[person].pop('truth_mm', None)
-    if entry.get('truth_mm') and old < len(detections):
-        detections[old]['truth_mm'] = entry['truth_mm']
-    return dict(with_detections(detections), person=person, truth_mm=truth_mm)
+def people_of(entry):
+    """As `detections_of`, with the truth of each person in the detection."""
+    people = detections_of(entry)
+    if people and entry.get('truth_mm'):
+        people[int(entry.get('person', 0))]['truth_mm'] = entry['truth_mm']
+    return people
 
 
-def with_detections(detections):
-    """Changes of an entry that replace its detections."""
-    return {'detections': detections, 'box': None, 'estimate_mm': None, 'original_mm': None}
+def changes_of(entry, people, person):
+    """Changes of an entry that store people, and select one by the index; None: by default the first one."""
+    detections = [dict(one) for one in people]
+    truth_mm = detections[person or 0].pop('truth_mm', None) if detections else None
+    changes = {'person': person, 'truth_mm': truth_mm}
+    if detections != detections_of(entry):
+        changes.update(detections=detections, box=None, estimate_mm=None, original_mm=None)
+    return {key: value for key, value in changes.items() if value != entry.get(key)}
 
 
 def drawn(box_px, box):

@@ -1,14 +1,19 @@
 """Estimated positions of a document, as the noise analysis computes them, and the errors that they make likely."""
+import contextlib
+
 import numpy as np
 
-from ros_3d_bb.sessions.plausibility import likely_errors, outlier_of
+from ros_3d_bb.estimation.box3d_estimator import estimator_named
+from ros_3d_bb.estimation.error_model import RECORDED
+from ros_3d_bb.sessions.plausibility import likely_errors, outlier_of, outliers_of
+from ros_3d_bb.sessions.session_reader import ANNOTATED
 
-MANY = 500  # measurements, of which a single one has no influence on the likely errors
+ESTIMATOR = 'foreground'  # the default of bbox3d_node
 
 
 class Estimates(object):
     """Estimates of the boxes of a document from its depth images, computed once for the boxes of a measurement.
-    `known`, `outlier` and `implausible` use what has been computed.
+    `known` and `implausible` use what has been computed.
     """
 
     def __init__(self, document):
@@ -17,30 +22,26 @@ class Estimates(object):
 
     def update(self):
         """Adapt to changed measurements."""
-        self._people = self._likely = self._implausible = None
+        self._people = self._implausible = None
 
     def of(self, index, depth=None):
         """Positions of the detections of a measurement, each (3,) or None. `depth` is its depth image, if it is read.
         """
-        positions = self.known(index)
+        positions, measurement = self.known(index), self._document.measurements[index]
         if positions is None:
-            positions = tuple(self._document.positions(index, depth))
-            measurement = self._document.measurements[index]
-            self._known[index] = measurement, positions
+            if depth is None:
+                with contextlib.suppress(ValueError):
+                    depth = self._document.depth(index)
+            positions = tuple(None if depth is None else self._position(measurement._replace(person=person), depth)
+                              for person in range(len(measurement.detections)))
+            self._known[_input_of(measurement)] = positions
             if measurement.truths:
                 self.update()
         return positions
 
     def known(self, index):
         """Positions as from `of`, or None if they have not been computed for the current boxes."""
-        measurement, positions = self._known.get(index, (None, None))
-        current = self._document.measurements[index]
-        if measurement is current:
-            return positions
-        if measurement is None or _input_of(measurement) != _input_of(current):
-            return None
-        self._known[index] = current, positions
-        return positions
+        return self._known.get(_input_of(self._document.measurements[index]))
 
     def missing(self):
         """Yield the indices of annotated measurements whose estimates have not been computed."""
@@ -48,57 +49,60 @@ class Estimates(object):
             if measurement.truths and self.known(index) is None:
                 yield index
 
+    def complete(self):
+        """Compute the missing estimates."""
+        for index in self.missing():
+            self.of(index)
+
     def implausible(self):
-        """Detections with an implausible truth, {index: [detection, ...]}."""
+        """Outliers among the people with truth and estimate, {index: {detection: Outlier}}."""
         if self._implausible is None:
             people, measured_m, truth_m = self._annotated()
-            plausible = self._likely_without(None).are_plausible(measured_m, truth_m) if people else ()
+            names = [self._document.measurements[index].name for index, _person in people]
             self._implausible = {}
-            for (index, person), is_plausible in zip(people, plausible):
-                if not is_plausible:
-                    self._implausible.setdefault(index, []).append(person)
+            for (index, person), outlier in zip(people, outliers_of(names, measured_m, truth_m)):
+                if outlier is not None:
+                    self._implausible.setdefault(index, {})[person] = outlier
         return self._implausible
 
-    def outlier(self, index, person, truth_m=None):
-        """Outlier of a person with the true position (x, y, z), or None if it is plausible or there is no estimate.
+    def outlier(self, index, person, truth_m):
+        """Outlier of a person with a new true position (x, y, z), compared with the other measurements.
 
-        Without `truth_m` the stored truth is checked; otherwise the measurement is compared with the others only.
+        None if the position is plausible, or there is no estimate.
         """
-        measurement, positions = self._document.measurements[index], self.known(index)
-        is_stored = truth_m is None
-        if is_stored and person not in self.implausible().get(index, ()):
+        position_m = self.of(index)[person]
+        if position_m is None:
             return None
-        truth_m = measurement.truths[person] if is_stored else truth_m
-        if positions is None or positions[person] is None or (is_stored and measurement.rejected is not None):
-            return None
-        likely = self._likely_without(None if is_stored else index)
-        return outlier_of(measurement.name, likely, positions[person][[0, 2]], np.array([truth_m[0], truth_m[2]]))
+        people, measured_m, others_m = self._annotated()
+        others = np.array([other != index for other, _person in people], bool)
+        return outlier_of(self._document.measurements[index].name, likely_errors(measured_m[others], others_m[others]),
+                          position_m[[0, 2]], np.array(truth_m[::2]))
+
+    def _position(self, measurement, depth):
+        """Position (3,) of the selected person of a measurement, or None."""
+        box = measurement.estimate(depth, self._document.camera, estimator_named(ESTIMATOR))
+        return None if box is None else box.center_m
+
+    def people(self, estimator=ESTIMATOR):
+        """Yield index, detection, estimate (3,) and truth (x, y, z) of the annotated people with a known estimate.
+
+        `estimator` is that of the noise analysis, or 'recorded' for the stored estimates.
+        """
+        for index, measurement in enumerate(self._document.measurements):
+            if measurement.state == ANNOTATED:
+                recorded = [detection.estimate_m for detection in measurement.detections]
+                positions = recorded if estimator == RECORDED else self.known(index)
+                for person, truth_m in sorted(measurement.truths.items()):
+                    if positions is not None and positions[person] is not None:
+                        yield index, person, positions[person], truth_m
 
     def _annotated(self):
-        """Pairs (index, detection) of annotated people with an estimate, measured and true (x, z), each (n, 2)."""
+        """Pairs (index, detection) of the annotated people, measured and true (x, z), each (n, 2)."""
         if self._people is None:
-            people, rows = [], []
-            for index, measurement in enumerate(self._document.measurements):
-                truths = measurement.truths if measurement.rejected is None else {}
-                positions = self.known(index) if truths else None
-                for person, truth_m in truths.items() if positions is not None else ():
-                    if positions[person] is not None:
-                        people.append((index, person))
-                        rows.append((positions[person][0], positions[person][2], truth_m[0], truth_m[2]))
-            rows = np.reshape(rows, (-1, 4)).astype(float)
-            self._people = people, rows[:, :2], rows[:, 2:]
+            people = list(self.people())
+            measured_m, truth_m = (np.reshape([one[column][::2] for one in people], (-1, 2)) for column in (2, 3))
+            self._people = [one[:2] for one in people], measured_m.astype(float), truth_m.astype(float)
         return self._people
-
-    def _likely_without(self, excluded):
-        """LikelyErrors of all annotated people, or of those in measurements other than `excluded`."""
-        people, measured_m, truth_m = self._annotated()
-        if excluded is not None and len(people) <= MANY:
-            others = np.array([index != excluded for index, _person in people], bool)
-            if not others.all():
-                return likely_errors(measured_m[others], truth_m[others])
-        if self._likely is None:
-            self._likely = likely_errors(measured_m, truth_m)
-        return self._likely
 
 
 def _input_of(measurement):

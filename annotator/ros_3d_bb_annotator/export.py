@@ -1,15 +1,14 @@
-"""Table of a session as CSV in millimetres, which `./run noise --z --x` reads. It has one row per annotated person.
+"""Results of a session: the noise analysis, and a table as CSV in millimetres, which `./run noise --z --x` reads.
 
-Errors are measured minus true values.
+The table has one row per annotated person. Errors are measured minus true values.
 """
 import csv
 import io
 import os
+import pathlib
 
 from ros_3d_bb.core.atomic_file import atomic_write
-from ros_3d_bb.estimation.error_model import RECORDED
 from ros_3d_bb.sessions.session_reader import SessionError
-from ros_3d_bb_annotator.measurement import ANNOTATED
 
 AXES = 'XYZ'
 COLUMNS = (('id', 'label', 'stamp', 'x1', 'y1', 'x2', 'y2', 'estimator')
@@ -22,15 +21,16 @@ def rows_of(document, estimator):
 
     `estimator` is that of the noise analysis, or 'recorded' for the stored estimates.
     """
-    implausible = set((index, person) for index, person, _outlier in document.outliers())
-    for index, person, position_m, truth_m in _people_of(document, estimator):
+    document.estimates.complete()
+    implausible = document.estimates.implausible()
+    for index, person, position_m, truth_m in document.estimates.people(estimator):
         measurement, detection = document.measurements[index], document.measurements[index].detections[person]
         recorded_m = detection.estimate_m if detection.estimate_m is not None else (None,) * 3
         errors_m = [None if None in pair else pair[0] - pair[1] for pair in zip(position_m, truth_m)]
         yield ((measurement.id, measurement.label, measurement.stamp_text) + (detection.box_px or ('',) * 4)
                + (estimator,) + tuple(_millimetres(value_m) for values_m in (position_m, recorded_m, truth_m, errors_m)
                                       for value_m in values_m)
-               + ('yes' if (index, person) in implausible else '',))
+               + ('yes' if person in implausible.get(index, ()) else '',))
 
 
 def export(document, path, estimator):
@@ -50,16 +50,19 @@ def export(document, path, estimator):
     return len(rows)
 
 
-def _people_of(document, estimator):
-    """Yield index, detection, estimate (3,) and truth (x, y, z) of the annotated people with an estimate."""
-    for index, measurement in enumerate(document.measurements):
-        if measurement.state != ANNOTATED:
-            continue
-        positions = ([detection.estimate_m for detection in measurement.detections] if estimator == RECORDED
-                     else document.estimates.of(index))
-        for person, truth_m in sorted(measurement.truths.items()):
-            if positions[person] is not None:
-                yield index, person, positions[person], truth_m
+def analyse(session, folder, estimator):
+    """Write report, figures and error model of the annotated measurements of a session to a folder.
+
+    By default it is `analysis` in the session. `estimator` is 'foreground', 'median', or 'recorded' for the stored
+    estimates. Returns the Analysis of the lab, and the folder (pathlib.Path). Raises ValueError if there are too few
+    measurements.
+    """
+    from ros_3d_bb_lab.evaluation.noise import analysis, report, tables  # optional scipy and matplotlib take a second
+    folder = pathlib.Path(folder or os.path.join(session, 'analysis'))
+    table = tables.read_session_measurements(session, estimator)
+    found = analysis.analyse(analysis.Inputs.of(table, table, table, estimator, 'unknown'))
+    report.write_results(folder, found)
+    return found, folder
 
 
 def _millimetres(value_m):

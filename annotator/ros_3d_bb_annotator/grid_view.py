@@ -2,7 +2,8 @@
 import math
 from typing import Any, NamedTuple, Optional, Tuple
 
-from ros_3d_bb_annotator.lengths import length_text, position_text
+from ros_3d_bb.sessions.plausibility import position_text
+from ros_3d_bb_annotator.lengths import length_text
 from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets, Signal
 
 GROUND, LINES, CAMERA, TEXT = (QtGui.QColor(*color) for color in (
@@ -140,7 +141,7 @@ class GridView(QtWidgets.QWidget):
 
     def _point_at(self, mark):
         self._pointed = mark
-        self.setToolTip('' if mark is None else '%s: %s' % (mark.name, position_text((mark.x_m, None, mark.z_m))))
+        self.setToolTip('' if mark is None else '%s: %s' % (mark.name, position_text((mark.x_m, mark.z_m))))
         self.update()
 
     def _mark_at(self, position):

@@ -33,8 +33,3 @@ def number_text(length_m, signed=False):
 def length_text(length_m, signed=False):
     """Format a length in millimetres."""
     return '%s mm' % number_text(length_m, signed)
-
-
-def position_text(position_m):
-    """Format x and z of a position (x, y, z)."""
-    return 'X %s, Z %s' % (number_text(position_m[0], True), length_text(position_m[2]))

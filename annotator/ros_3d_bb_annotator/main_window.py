@@ -49,7 +49,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         """Method that an action calls: a method of the window or of one of its parts."""
         if name.startswith('choose_'):
             return functools.partial(self.edits.choose_person, int(name.split('_')[1]) - 1)
-        owners = self, self.edits, self.results, self.pane.shared, self.pane.truth
+        owners = self, self.edits, self.results, self.pane.images, self.pane.truth
         return next(getattr(owner, name) for owner in owners if hasattr(owner, name))
 
     def ask_session(self):
@@ -60,7 +60,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
     def open_session(self, folder):
         """Open the session in a folder, or show an error message. Returns whether it is open."""
         try:
-            document = Document.open(folder)
+            document = Document(folder)
         except (ValueError, OSError) as error:
             dialogs.show_error(self, 'The session cannot be opened', error)
             return False
@@ -114,10 +114,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
 
     def next_implausible(self):
         """Show the next measurement with an implausible truth."""
-        self._go_to_next(self.document.is_implausible, 'No implausible positions')
-
-    def go_to_truth(self):
-        self.pane.truth.begin()
+        self._go_to_next(lambda number: number in self.document.estimates.implausible(), 'No implausible positions')
 
     def after_edit(self):
         """Update the window from the document."""
@@ -128,7 +125,6 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
     def closeEvent(self, event):  # noqa: N802 (Qt's name)
         self._refresh.stop()
         self._estimate.stop()
-        self.results.wait()
         super(AnnotatorWindow, self).closeEvent(event)
 
     def _go_to(self, number):
@@ -173,8 +169,8 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self.progress.setValue(done)
         self.progress.setFormat('%d of %d done' % (done, count))
         measurement = self.measurement
-        self.actions['undo'].setEnabled(bool(self.document and self.document.can_undo))
-        self.actions['redo'].setEnabled(bool(self.document and self.document.can_redo))
+        self.actions['undo'].setEnabled(bool(self.document and self.document.undo_steps))
+        self.actions['redo'].setEnabled(bool(self.document and self.document.redo_steps))
         self.actions['clear_truth'].setEnabled(measurement is not None and measurement.truth_m is not None)
         self.actions['enter_for_label'].setEnabled(measurement is not None and bool(measurement.label))
         self.actions['delete_box'].setEnabled(measurement is not None and measurement.person is not None)
@@ -206,8 +202,7 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
     def _connect(self):
         self.list.chosen.connect(self.show_measurement)
         self.pane.person_chosen.connect(self.edits.choose_person)
-        self.pane.shared.box_drawn.connect(self.edits.add_box)
-        self.pane.shared.box_edited.connect(self.edits.replace_box)
+        self.pane.images.box_drawn.connect(self.edits.draw_box)
         self.pane.truth.entered.connect(self.edits.enter_truth)
         self.pane.floor.mark_chosen.connect(lambda mark: self.edits.enter_truth((mark.x_m, None, mark.z_m)))
 

@@ -51,14 +51,13 @@ def paint_scene(painter, transform, scene):
                      CHOSEN if box.number == scene.person else OTHER)
 
 
-def paint_cursor(painter, transform, shared):
-    """Paint the crosshair of a SharedView, and the box that is being drawn."""
-    band = shared.rubber_band()
+def paint_cursor(painter, transform, cursor, band):
+    """Paint the crosshair at a pixel (u, v) or None, and the box that is being drawn, or None."""
     if band is not None:
         _paint_box(painter, transform, band, DRAWN, (2, Qt.SolidLine))
-    if shared.cursor is None:
+    if cursor is None:
         return
-    point = transform.map(QtCore.QPointF(shared.cursor[0] + 0.5, shared.cursor[1] + 0.5))
+    point = transform.map(QtCore.QPointF(cursor[0] + 0.5, cursor[1] + 0.5))
     arm = 12 if band is None else 3000
     for color, width in ((QtGui.QColor(0, 0, 0, 160), 3), (DRAWN if arm > 12 else Qt.white, 1)):
         painter.setPen(QtGui.QPen(color, width))

@@ -1,11 +1,19 @@
 """Floor marks as text: one mark per line with name, X and Z, separated by tabs, semicolons, commas or spaces."""
 import re
+from typing import NamedTuple
 
 from ros_3d_bb_annotator.lengths import parse_length
-from ros_3d_bb_annotator.measurement import Mark
 
 HEADER = re.compile(r'(name|mark|label)\b', re.IGNORECASE)
 LEAST_Z_M = 0.05  # people stand farther away; probably metres without a unit
+
+
+class Mark(NamedTuple):
+    """Marked position on the floor in the camera's optical frame: X to the right, Z forward, in metres."""
+
+    name: str
+    x_m: float
+    z_m: float
 
 
 def parse_marks(text):
@@ -20,24 +28,21 @@ def parse_marks(text):
             continue  # a header, not a mark such as "Mark 1"
         if len(cells) != 3:
             raise ValueError('line %d is %.60r; name, X and Z expected, such as A1, -600, 1500' % (number, line))
-        mark = _mark_of(*cells, where='line %d' % number)
-        if mark.name.casefold() in [other.name.casefold() for other in marks]:
-            raise ValueError('the name %s is not unique' % mark.name)
+        try:
+            mark = Mark(cells[0], parse_length(cells[1]), parse_length(cells[2]))
+            _check(mark, marks)
+        except ValueError as error:
+            raise ValueError('line %d: %s' % (number, error))
         marks.append(mark)
     return tuple(marks)
 
 
-def _mark_of(name, x, z, where):
-    """Mark of texts. Raises ValueError, whose message starts with `where`."""
-    if not name.strip():
-        raise ValueError('%s: the name is empty' % where)
-    try:
-        mark = Mark(name.strip(), parse_length(x), parse_length(z))
-    except ValueError as error:
-        raise ValueError('%s: %s' % (where, error))
-    if not mark.z_m > 0:
-        raise ValueError('%s: Z is %s; more than 0 expected, as the camera looks along Z' % (where, z.strip()))
+def _check(mark, others):
+    """Raise ValueError if a mark cannot be used beside others."""
+    if not mark.name:
+        raise ValueError('the name is empty')
+    if mark.name.casefold() in [other.name.casefold() for other in others]:
+        raise ValueError('the name %s is not unique' % mark.name)
     if mark.z_m < LEAST_Z_M:
-        raise ValueError('%s: Z is %s, %g mm; at least %g mm expected. Check the unit'
-                         % (where, z.strip(), 1000 * mark.z_m, 1000 * LEAST_Z_M))
-    return mark
+        raise ValueError('Z is %g mm; at least %g mm ahead of the camera expected. Check the unit'
+                         % (1000 * mark.z_m, 1000 * LEAST_Z_M))

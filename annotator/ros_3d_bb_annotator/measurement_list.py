@@ -1,6 +1,6 @@
 """List of measurements with their states: a Qt model, and a view."""
+from ros_3d_bb.sessions.session_reader import ANNOTATED, NEW, NOBODY, REJECTED
 from ros_3d_bb_annotator.lengths import number_text
-from ros_3d_bb_annotator.measurement import ANNOTATED, NEW, NOBODY, REJECTED
 from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets, Signal
 
 COLUMNS = ('ID', 'Label', 'State', 'X', 'Z', 'Error')
@@ -51,7 +51,7 @@ class MeasurementModel(QtCore.QAbstractTableModel):
         if measurement.problem is not None and measurement.rejected is None:
             return INVALID
         state = measurement.state
-        return IMPLAUSIBLE if state == ANNOTATED and self._document.is_implausible(row) else state
+        return IMPLAUSIBLE if state == ANNOTATED and row in self._document.estimates.implausible() else state
 
     def data(self, index, role=Qt.DisplayRole):
         row, column = index.row(), index.column()

@@ -1,20 +1,19 @@
 """View of one measurement: images, people, truth, and position on the floor."""
 import html
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from ros_3d_bb.estimation.box3d_estimator import estimator_named
+from ros_3d_bb.sessions.plausibility import position_text
+from ros_3d_bb.sessions.session_reader import NOBODY
 from ros_3d_bb.visualization.image_overlay import DEPTH_RANGE_M, colorize_depth, depth_to_grey
-from ros_3d_bb_annotator.document import ESTIMATOR
+from ros_3d_bb_annotator.estimates import ESTIMATOR
 from ros_3d_bb_annotator.grid_view import FloorScene, GridView
-from ros_3d_bb_annotator.image_view import ImageView
-from ros_3d_bb_annotator.lengths import length_text, position_text
+from ros_3d_bb_annotator.image_view import ImageView, Panel
+from ros_3d_bb_annotator.lengths import length_text
 from ros_3d_bb_annotator.marking import MarkedBox, Scene
-from ros_3d_bb_annotator.measurement import NOBODY
 from ros_3d_bb_annotator.measurement_list import COLORS, IMPLAUSIBLE
 from ros_3d_bb_annotator.qt import Qt, QtGui, QtWidgets, Signal
-from ros_3d_bb_annotator.shared_view import SharedView
 from ros_3d_bb_annotator.truth_panel import TruthPanel, error_text
 from ros_3d_bb_annotator.validation import truth_problems
 
@@ -22,53 +21,41 @@ NOBODY_TEXT = 'Nobody was found: draw a box around the person (Shift and drag), 
 HEADER = '<span style="font-size: large"><b>%s</b></span> &nbsp; <b style="color: %s">%s</b> &nbsp; %s'
 
 
-class Pictures(NamedTuple):
-    """QImages of a measurement or None, with the problems, and the DepthImage or None."""
-
-    color_image: Any
-    color_problem: str
-    depth_image: Any
-    depth_problem: str
-    depth: Any
-
-
 class MeasurementPane(QtWidgets.QWidget):
     """View of one measurement of a document. `person_chosen` is emitted with the index of a detection.
 
-    `truth`, `floor` and `shared` have the signals for other user actions.
+    `truth`, `floor` and `images` have the signals for other user actions.
     """
 
     person_chosen = Signal(int)
 
     def __init__(self, parent=None):
         super(MeasurementPane, self).__init__(parent)
-        self.shared, self.truth, self.floor = SharedView(self), TruthPanel(), GridView()
-        self.color_view, self.depth_view = ImageView('colour', self.shared), ImageView('depth', self.shared)
+        self.images, self.truth, self.floor = ImageView(), TruthPanel(), GridView()
         self.header, self.banner = _label(), _label()
         self.banner.setText(NOBODY_TEXT)
         self.readout = QtWidgets.QLabel()
         self.people, self.buttons = QtWidgets.QListWidget(), QtWidgets.QHBoxLayout()
-        self._document, self._measurement, self._shown, self._shown_images, self._index = (None,) * 5
+        self._document, self._measurement, self._depth, self._shown_files, self._index = (None,) * 5
         self._lay_out()
         self.header.setText('No session is open: File, Open a session (Ctrl+O).')
-        for view in (self.color_view, self.depth_view):
-            view.box_chosen.connect(self.person_chosen)
+        self.images.box_chosen.connect(self.person_chosen)
         self.people.setAlternatingRowColors(True)
         self.people.setWordWrap(True)
         self.people.setHorizontalScrollBarPolicy(Qt.ScrollBarAlwaysOff)
         for signal in (self.people.itemActivated, self.people.itemClicked):
             signal.connect(lambda item: self.person_chosen.emit(self.people.row(item)))
-        self.shared.pointed.connect(self._show_readout)
+        self.images.pointed.connect(self._show_readout)
         self.truth.previewed.connect(self._show_preview)
 
     def set_usable(self, usable):
         """Enable the widgets if there is a current measurement."""
-        for widget in (self.color_view, self.depth_view, self.people, self.truth, self.floor):
+        for widget in (self.images, self.people, self.truth, self.floor):
             widget.setEnabled(usable)
 
     def show_document(self, document):
         """Set the document. No measurement is shown yet."""
-        self._document, self._measurement, self._shown, self._shown_images = document, None, None, None
+        self._document, self._measurement, self._depth, self._shown_files = document, None, None, None
         self.header.setText('This session contains no measurements yet.')
         self.banner.hide()
 
@@ -76,20 +63,13 @@ class MeasurementPane(QtWidgets.QWidget):
         """Show a measurement, also if it has changed. The text that is typed for it remains."""
         before, self._index = self._measurement, number
         self._measurement = measurement = self._document.measurements[number]
-        images = measurement.id, measurement.color_path, measurement.depth_path
-        if images != self._shown_images:
-            self._shown, self._shown_images = _read_pictures(self._document, number), images
-        pictures = self._shown
-        self._document.estimates.of(number, pictures.depth)
+        files = measurement.id, measurement.color_path, measurement.depth_path
+        if files != self._shown_files:
+            (self._panels, self._depth), self._shown_files = _read_panels(self._document, number), files
+        self._document.estimates.of(number, self._depth)
         self._show_header(measurement)
         self.banner.setVisible(measurement.state == NOBODY)
-        image = pictures.color_image or pictures.depth_image
-        if image is not None:
-            self.shared.show_size(image.width(), image.height())
-        self.shared.cancel()
-        scene = self._scene()
-        self.color_view.show_image(pictures.color_image, scene, pictures.color_problem)
-        self.depth_view.show_image(pictures.depth_image, scene, pictures.depth_problem)
+        self.images.show_images(self._panels, self._scene())
         self._show_people(measurement)
         self.truth.show_truth(measurement.truth_m, self._document.mark_of(number),
                               before is not None and before.id == measurement.id)
@@ -99,21 +79,21 @@ class MeasurementPane(QtWidgets.QWidget):
         details = [text for text in (measurement.label, measurement.stamp_text and 'at %s s' % measurement.stamp_text,
                                      measurement.rejected and 'reason: %s' % measurement.rejected,
                                      measurement.problem) if text]
-        state = IMPLAUSIBLE if self._document.is_implausible(self._index) else measurement.state
+        state = IMPLAUSIBLE if self._index in self._document.estimates.implausible() else measurement.state
         self.header.setText(HEADER % (html.escape(measurement.id), COLORS[state].name(), state,
                                       html.escape(' · '.join(details))))
 
     def _scene(self):
         """Overlay of the measurement: boxes, and if there is depth, the samples of the estimator in each of them."""
-        boxes, depth = [], self._shown.depth
+        boxes = []
         for number, (detection, position_m) in enumerate(
                 zip(self._measurement.detections, self._document.estimates.of(self._index))):
             if detection.box_px is not None:
                 distance = '' if position_m is None else ': %s' % length_text(position_m[2])
                 boxes.append(MarkedBox(number, detection.box_px, '%d%s' % (number + 1, distance), detection.by_hand))
         sample = estimator_named(ESTIMATOR).sample
-        samples = () if depth is None else tuple(
-            sample(depth, box.rect_px) for box in boxes
+        samples = () if self._depth is None else tuple(
+            sample(self._depth, box.rect_px) for box in boxes
             if box.rect_px[0] < box.rect_px[2] and box.rect_px[1] < box.rect_px[3])
         return Scene(tuple(boxes), self._measurement.person, samples)
 
@@ -131,8 +111,8 @@ class MeasurementPane(QtWidgets.QWidget):
             self.people.setCurrentRow(measurement.person)
 
     def _show_readout(self):
-        depth, camera = (self._shown.depth, self._document.camera) if self._shown is not None else (None, None)
-        self.readout.setText(_readout_text(self.shared.cursor, depth, camera))
+        camera = None if self._document is None else self._document.camera
+        self.readout.setText(_readout_text(self.images.cursor, self._depth, camera))
 
     def _show_preview(self, truth_m):
         """Show error and floor for the typed truth (x, y, z), or without truth for None."""
@@ -155,15 +135,12 @@ class MeasurementPane(QtWidgets.QWidget):
             None if position_m is None else tuple(position_m[[0, 2]].tolist()), sight))
 
     def _lay_out(self):
-        views = QtWidgets.QSplitter(Qt.Horizontal)
-        views.addWidget(self.color_view)
-        views.addWidget(self.depth_view)
         self.banner.setStyleSheet('background: #fff3c4; color: #5c4400; padding: 6px')
         self.banner.hide()
         self.readout.setTextInteractionFlags(Qt.TextSelectableByMouse)
         layout = QtWidgets.QVBoxLayout(self)
         layout.setContentsMargins(6, 6, 6, 0)
-        for widget, stretch in ((self.banner, 0), (self.header, 0), (views, 1), (self.readout, 0)):
+        for widget, stretch in ((self.banner, 0), (self.header, 0), (self.images, 1), (self.readout, 0)):
             layout.addWidget(widget, stretch)
         layout.addLayout(self._lower_part())
 
@@ -177,7 +154,7 @@ class MeasurementPane(QtWidgets.QWidget):
         floor_layout.setContentsMargins(4, 4, 4, 4)
         floor_layout.addWidget(self.floor)
         layout = QtWidgets.QHBoxLayout()
-        people_box.setMinimumWidth(self.fontMetrics().boundingRect('recorded: X +0000').width())
+        people_box.setMinimumWidth(self.fontMetrics().boundingRect('recorded: X −0000').width())
         layout.addWidget(people_box, 4)
         layout.addLayout(middle, 4)
         layout.addWidget(floor_box, 4)
@@ -195,9 +172,9 @@ def _detection_text(number, detection, position_m, truth_m):
     """Description of a detection: the analysed estimate, the recorded one, and details."""
     details = (detection.support is not None and 'support %.0f %%' % (100 * detection.support),
                detection.truncated and 'truncated', detection.by_hand and 'drawn by hand')
-    lines = ('no estimate' if position_m is None else position_text(position_m),
-             detection.estimate_m is not None and 'recorded: %s' % position_text(detection.estimate_m),
-             truth_m is not None and 'true: %s' % position_text(truth_m), ', '.join(filter(None, details)))
+    lines = ('no estimate' if position_m is None else position_text(position_m[::2]),
+             detection.estimate_m is not None and 'recorded: %s' % position_text(detection.estimate_m[::2]),
+             truth_m is not None and 'true: %s' % position_text(truth_m[::2]), ', '.join(filter(None, details)))
     return '%d: %s' % (number + 1, '\n'.join(filter(None, lines)))
 
 
@@ -216,11 +193,12 @@ def _readout_text(cursor, depth, camera):
         length_text(depth_m), length_text(x_m, True), length_text(y_m, True), length_text(z_m))
 
 
-def _read_pictures(document, number):
+def _read_panels(document, number):
+    """Read the Panels of a measurement, and its DepthImage or None."""
     color, color_problem = _read_or_error(document.color, number)
     depth, depth_problem = _read_or_error(document.depth, number)
     shown = None if depth is None else colorize_depth(depth_to_grey(depth, DEPTH_RANGE_M))
-    return Pictures(_image_of(color), color_problem, _image_of(shown), depth_problem, depth)
+    return (Panel('colour', _image_of(color), color_problem), Panel('depth', _image_of(shown), depth_problem)), depth
 
 
 def _image_of(rgb):

@@ -1,15 +1,14 @@
 """Validation of sessions: readable images, boxes inside the image, plausible estimates and truth."""
 import collections
 
-from ros_3d_bb.sessions.session_reader import SessionError
-from ros_3d_bb_annotator.measurement import REJECTED
+from ros_3d_bb.sessions.session_reader import REJECTED, SessionError
 
 HALF_PERSON_M = 0.5  # the body of a person whose axis is just outside the image may be visible
 
 
 def problems_of(document):
     """Yield the problems of a document as lines of text. Rejected measurements are skipped."""
-    document.outliers()  # computes all estimates
+    document.estimates.complete()
     counts = collections.Counter(measurement.id for measurement in document.measurements)
     for name in sorted(name for name, count in counts.items() if count > 1):
         yield '%s: %d measurements have this id' % (name, counts[name])
@@ -29,7 +28,7 @@ def _problems_at(document, index):
     except SessionError as error:
         return [str(error)]
     boxes = _box_problems(document, index)
-    return boxes or _estimate_problems(document, index) + _problems_of_truths(document, index)
+    return boxes or _estimate_problems(document, index) + list(_problems_of_truths(document, index))
 
 
 def _box_problems(document, index):
@@ -54,9 +53,11 @@ def _estimate_problems(document, index):
 
 
 def _problems_of_truths(document, index):
-    return [problem for person, truth_m in document.measurements[index].truths.items()
-            for problem in view_problems(document, truth_m)
-            + [outlier.description for outlier in [document.estimates.outlier(index, person)] if outlier is not None]]
+    outliers = document.estimates.implausible().get(index, {})
+    for person, truth_m in document.measurements[index].truths.items():
+        yield from view_problems(document, truth_m)
+        if person in outliers:
+            yield outliers[person].description
 
 
 def truth_problems(document, index, truth_m):

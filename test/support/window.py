@@ -15,23 +15,15 @@ FORGOTTEN_MS = 10000
 APPLICATION = make_application()  # Qt ends with the last reference to it
 
 
-class ForgottenDialogs(QtCore.QTimer):
-    """Closes a dialog that is open at two successive ticks: without an answer, the test would wait forever."""
-
-    def __init__(self):
-        super(ForgottenDialogs, self).__init__()
-        self._open = None
-        self.timeout.connect(self._close)
-        self.start(FORGOTTEN_MS)
-
-    def _close(self):
-        before, self._open = self._open, QtWidgets.QApplication.activeModalWidget()
-        if before is not None and before is self._open and not isinstance(before, QtWidgets.QProgressDialog):
-            before.close()
-            self._open = None
+def close_forgotten(before=None):
+    """Close a dialog that was open at the last call, too: without an answer, the test would wait forever."""
+    dialog = QtWidgets.QApplication.activeModalWidget()
+    if dialog is not None and dialog is before and not isinstance(dialog, QtWidgets.QProgressDialog):
+        dialog.close()
+    QtCore.QTimer.singleShot(FORGOTTEN_MS, lambda: close_forgotten(dialog))
 
 
-FORGOTTEN_DIALOGS = ForgottenDialogs()
+close_forgotten()
 
 
 class Driver(object):
@@ -119,4 +111,4 @@ class Driver(object):
 
 def opened(folder):
     """The measurements of a session, as another program reads them."""
-    return Document.open(folder).measurements
+    return Document(folder).measurements

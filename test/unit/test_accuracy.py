@@ -6,7 +6,7 @@ import pytest
 from conftest import DATA
 from ros_3d_bb.estimation.box3d_estimator import estimator_named
 from ros_3d_bb.sessions.session_reader import read_session
-from ros_3d_bb_lab.evaluation.accuracy import Estimates, boxes_of, compare, scores_of
+from ros_3d_bb_lab.evaluation.accuracy import Estimates, compare, scores_of, with_detected_boxes
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 
 REAL_WEIGHTS = pytest.mark.needs(*['torch'] * bool(DATA))
@@ -32,12 +32,11 @@ def result(tmp_path_factory):
     """Result for the real measurements with YOLOv5n's boxes, or for a simulated session with exact boxes."""
     if DATA:
         session = read_session(os.path.join(DATA, 'data', 'thesis'))
-        boxes = boxes_of(session, os.path.join(DATA, 'weights', 'yolov5n.pt'))
+        session = with_detected_boxes(session, os.path.join(DATA, 'weights', 'yolov5n.pt'))
     else:
         folder = str(tmp_path_factory.mktemp('session'))
         session = read_session(write_simulated_session(folder, (1.5, 2.5, 3.5), (-0.3, 0.0, 0.3), 4))
-        boxes = boxes_of(session)
-    return compare(session, boxes, estimator_named('foreground'))[0]
+    return compare(session, estimator_named('foreground'))[0]
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.sessions.session_reader import SessionError, read_session
 from ros_3d_bb_annotator.document import Document
-from ros_3d_bb_annotator.measurement import Mark
+from ros_3d_bb_annotator.marks import Mark
 from ros_3d_bb_annotator.validation import problems_of
 from support.small_session import (FAR_BOX, NEAR_BOX, NEAR_MM, change_json, read_json, write_measurement,
                                    write_small_session)
@@ -36,10 +36,10 @@ def test_truth_is_saved_immediately_and_read_by_benchmarks(document, folder):
     entries = read_json(folder)['frames']
     assert entries[1]['truth_mm'] == {'x': 100, 'z': 2300} and entries[2]['truth_mm'] == {'x': 100, 'z': 2300, 'y': -50}
     frames = read_session(folder).frames
-    assert frames[1].truth_m.tolist() == [0.1, 2.3] and frames[1].truth_y_m is None and frames[2].truth_y_m == -0.05
+    assert frames[1].truth_m == (0.1, None, 2.3) and frames[2].truth_m == (0.1, -0.05, 2.3)
     assert frames[2].boxes_px == (FAR_BOX, NEAR_BOX) and frames[2].estimate_m.tolist() == [0.7, 0.1, 3.0]
     assert frames[0].stamp_ns == 1616161616000000005 and frames[0].label == 'by the door'
-    assert Document.open(folder).measurements[2].truth_m == (0.1, -0.05, 2.3)
+    assert Document(folder).measurements[2].truth_m == (0.1, -0.05, 2.3)
 
 
 @settings(max_examples=25)
@@ -47,7 +47,7 @@ def test_truth_is_saved_immediately_and_read_by_benchmarks(document, folder):
                           st.integers(0, 3), st.integers(0, 1)), max_size=12))
 def test_after_any_edits_the_file_is_what_is_shown_and_undo_leads_back(tmp_path_factory, edits):
     folder = write_small_session(str(tmp_path_factory.mktemp('session')))
-    start, document = read_json(folder), Document.open(folder)
+    start, document = read_json(folder), Document(folder)
     for kind, index, number in edits:
         if kind in ('undo', 'redo'):
             getattr(document, kind)()
@@ -56,9 +56,9 @@ def test_after_any_edits_the_file_is_what_is_shown_and_undo_leads_back(tmp_path_
                 [index], 'no'), 'restore': lambda: document.restore(index),
              'person': lambda: document.choose_person(index, number)}[kind]()
     shown, saved = ([(one.truth_m, one.person, one.rejected) for one in source.measurements]
-                    for source in (document, Document.open(folder)))
+                    for source in (document, Document(folder)))
     assert shown == saved
-    while document.can_undo:
+    while document.undo_steps:
         document.undo()
     assert read_json(folder) == start
 
@@ -76,9 +76,9 @@ def test_measurements_added_by_a_viewer_are_kept_and_shown(document, folder):
 
 
 def test_two_annotators_keep_the_fields_of_each_other(document, folder):
-    other = Document.open(folder)
+    other = Document(folder)
     document.set_truths([0], 0.1, 2.0)
-    other.add_box(0, (1, 1, 30, 40))
+    other.draw_box(0, (1, 1, 30, 40))
     other.set_truths([1], 0.3, 2.2)
     assert read_json(folder)['frames'][0]['truth_mm'] == {'x': 100, 'z': 2000}
     assert document.refresh() and len(document.measurements[0].detections) == 3
@@ -93,7 +93,7 @@ def test_an_edit_that_cannot_be_saved_raises_an_error_and_changes_nothing(docume
     for edit in (lambda: document.set_truths([0], 0.1, 2.0), document.refresh):
         with pytest.raises(SessionError, match='frames.json|cannot be saved'):
             edit()
-    assert states(document) == ['new'] * 4 and not document.can_undo
+    assert states(document) == ['new'] * 4 and not document.undo_steps
     os.rename(folder, folder + '-gone')
     with pytest.raises(SessionError, match='cannot be saved'):
         document.set_truths([0], 0.1, 2.0)
@@ -113,22 +113,41 @@ def test_the_truth_belongs_to_the_nearest_box_unless_one_was_selected(document):
 def test_a_box_drawn_by_hand_is_estimated_and_chosen(document, folder):
     change_json(folder, lambda content: content['frames'][0]['detections'].pop(0))
     document.refresh()
-    box = document.add_box(0, NEAR_BOX)
+    document.draw_box(0, NEAR_BOX)
     drawn = document.measurements[0].detections[-1]
     assert document.measurements[0].person == 1 and drawn.by_hand and drawn.box_px == NEAR_BOX
-    assert box.center_m[2] == pytest.approx(NEAR_MM / 1000.0 + 0.09)  # the axis is behind the surface
-    assert np.abs(drawn.estimate_m - box.center_m).max() < 1e-5
-    assert drawn.support == pytest.approx(box.support, abs=1e-3) and drawn.truncated == box.truncated
+    assert drawn.estimate_m[2] == pytest.approx(NEAR_MM / 1000.0 + 0.09)  # the axis is behind the surface
+    assert document.estimates.of(0)[1] == pytest.approx(drawn.estimate_m, abs=1e-5)
+    assert drawn.support == pytest.approx(1, abs=1e-3) and drawn.truncated is True
     assert read_session(folder).frames[0].boxes_px == (NEAR_BOX, FAR_BOX)
 
 
 def test_a_box_drawn_by_hand_replaces_that_of_the_same_person(document, folder):
     change_json(folder, lambda content: content['frames'][0]['detections'][0].update(box=[10, 4, 26, 30]))
     document.refresh()
-    assert document.add_box(0, (-5, 4, 26, 44)) is not None
+    document.draw_box(0, (-5, 4, 26, 44))
     assert document.measurements[0].detections[-1].box_px == (0, 4, 26, 44)
-    assert document.add_box(0, NEAR_BOX).center_m[2] == pytest.approx(2.09)
+    document.draw_box(0, NEAR_BOX)
+    assert document.estimates.of(0)[3][2] == pytest.approx(2.09)
     assert read_session(folder).frames[0].boxes_px == (NEAR_BOX, FAR_BOX)
+
+
+def test_the_truth_stays_with_its_person_when_boxes_are_drawn_and_deleted(document):
+    near_m, far_m = (-0.47, None, 2.0), (0.7, None, 3.0)
+    document.set_truths([0], -0.47, 2.0)
+    document.draw_box(0, (12, 6, 28, 44))  # of the same person
+    assert document.measurements[0].truths == {2: near_m}
+    document.draw_box(0, (30, 5, 38, 20))  # of another one
+    assert document.measurements[0].person == 3 and document.measurements[0].truths == {2: near_m}
+    wall_m = document.estimates.of(0)[3][2]
+    document.draw_box(0, FAR_BOX, 3)
+    assert len(document.measurements[0].detections) == 4 and document.estimates.of(0)[3][2] < wall_m - 0.5
+    document.set_truths([0], 0.7, 3.0)
+    assert document.measurements[0].truths == {2: near_m, 3: far_m}
+    document.delete_box(0)
+    assert document.measurements[0].truths == {2: near_m} and document.measurements[0].person == 0
+    document.set_truths([0], 0.7, 3.0)  # nobody is selected any more
+    assert document.measurements[0].truths == {1: far_m, 2: near_m}
 
 
 @pytest.mark.parametrize('break_it', [
@@ -145,7 +164,7 @@ def test_truth_can_be_entered_for_a_box_that_cannot_be_estimated(document, folde
 def test_a_missing_image_is_named_and_other_measurements_can_be_annotated(folder):
     os.remove(os.path.join(folder, 'depth', 'm1.png'))
     os.remove(os.path.join(folder, 'color', 'm1.png'))
-    document = Document.open(folder)
+    document = Document(folder)
     assert [measurement.problem for measurement in document.measurements] == [
         None, 'there is no file color/m1.png and no file depth/m1.png', None, None]
     for read in (document.color, document.depth):
@@ -163,7 +182,7 @@ def test_a_missing_image_is_named_and_other_measurements_can_be_annotated(folder
     (lambda entry: entry.update(stamp='yesterday'), 'stamp is'), (lambda entry: entry.update(detections=5), 'int')])
 def test_an_invalid_entry_is_shown_with_its_fault(folder, break_it, problem):
     change_json(folder, lambda content: break_it(content['frames'][1]))
-    document = Document.open(folder)
+    document = Document(folder)
     assert problem in document.measurements[1].problem and document.measurements[1].state == 'new'
     assert problem in list(problems_of(document))[0]
     for edit in (lambda: document.color(1), lambda: document.set_truths([1], 0.1, 2.0)):
@@ -176,4 +195,4 @@ def test_an_invalid_entry_is_shown_with_its_fault(folder, break_it, problem):
 def test_a_session_with_an_invalid_grid_is_rejected(folder):
     change_json(folder, lambda content: content.update(grid=[{'name': 'A', 'x': float('nan'), 'z': 1}]))
     with pytest.raises(SessionError, match='frames.json'):
-        Document.open(folder)
+        Document(folder)

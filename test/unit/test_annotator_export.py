@@ -18,7 +18,7 @@ def test_a_row_contains_box_estimates_and_truth_in_all_axes(document, tmp_path):
     assert export(document, path, 'foreground') == 1
     with open(path, newline='') as stream:
         row, = csv.DictReader(stream)
-    x_m, y_m, z_m = document.estimated(0, NEAR_BOX).center_m
+    x_m, y_m, z_m = document.estimates.of(0)[0]
     assert (row['id'], row['label'], row['stamp']) == ('m0', 'by the door', '1616161616.000000005')
     assert [int(row[edge]) for edge in ('x1', 'y1', 'x2', 'y2')] == list(NEAR_BOX) and row['implausible'] == ''
     assert [float(row[axis + ' measured']) for axis in 'XYZ'] == pytest.approx(

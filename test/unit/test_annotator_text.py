@@ -3,8 +3,7 @@ import re
 import pytest
 
 from ros_3d_bb_annotator.lengths import parse_length
-from ros_3d_bb_annotator.marks import parse_marks
-from ros_3d_bb_annotator.measurement import Mark
+from ros_3d_bb_annotator.marks import Mark, parse_marks
 
 MARKS = (Mark('A1', -0.6, 1.5), Mark('B1', 0.0, 1.5))
 
@@ -24,8 +23,9 @@ def test_marks_whose_names_begin_as_a_header_are_kept():
 
 @pytest.mark.parametrize('text,named', [
     ('A1, -600', 'line 1 is'), ('A1, -600, 1500\nB1, far, 1500', "line 2: 'far' is not a length"),
-    ('A1, 0, 0', 'more than 0'), ('A1, 0, 1500\na1, 0, 2000', 'a1 is not unique'),
-    ('Name, X [m], Z [m]\nA1, -0.6, 1.5', 'line 2: Z is 1.5, 1.5 mm; at least 50 mm expected')])
+    ('A1, 0, 0', 'line 1: Z is 0 mm; at least 50 mm'),
+    (', 0, 1500', 'line 1: the name is empty'), ('A1, 0, 1500\na1, 0, 2000', 'a1 is not unique'),
+    ('Name, X [m], Z [m]\nA1, -0.6, 1.5', 'line 2: Z is 1.5 mm; at least 50 mm')])
 def test_invalid_tables_are_rejected(text, named):
     with pytest.raises(ValueError, match=named):
         parse_marks(text)

@@ -156,4 +156,4 @@ def test_the_annotator_imports_no_ros_and_the_noise_analysis_in_one_module():
         assert others <= STANDARD_LIBRARY | {'numpy', 'cv2'} | QT, module
         assert not any(lies_in(name, package) for name in ours for package in with_ros), module
         of_the_lab += [module] * any(lies_in(name, 'ros_3d_bb_lab') for name in ours)
-    assert of_the_lab == ['analysis']
+    assert of_the_lab == ['export']

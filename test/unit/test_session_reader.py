@@ -29,7 +29,7 @@ def test_reads_a_session(session_folder):
     color, depth = read_color(frame, session.camera), read_depth(frame, session)
     assert color.shape == (480, 640, 3) and color.dtype == np.uint8
     assert depth.values.shape == (480, 640) and depth.values.dtype == np.uint16 and depth.scale_m == 0.001
-    assert abs(frame.estimate_m[2] - frame.truth_m[1]) < 0.1 and len(frame.boxes_px) == 1
+    assert abs(frame.estimate_m[2] - frame.truth_m[2]) < 0.1 and len(frame.boxes_px) == 1
 
 
 @pytest.mark.parametrize('lens, expected', [

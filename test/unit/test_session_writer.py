@@ -84,6 +84,8 @@ def test_a_measurement_is_removed_with_its_images_unless_it_is_annotated(folder)
         content['frames'][1]['truth_mm'] = {'x': 0, 'z': 2000}
     with pytest.raises(ValueError, match='annotated'):
         remove(folder, ids[2])
+    with session_writer.locked_update(folder) as content:
+        content['frames'] += [{}, 7]  # invalid measurements do not prevent others
     assert append(folder, measurement(3))[0] not in ids
 
 

@@ -186,29 +186,29 @@ class ViewerNode(object):
 
     def capture(self):
         """Append the newest image and its boxes to the session. Returns whether it was stored, and a message."""
-        with self._capture_lock:
-            try:
-                done, self._answer = True, self._stored()
-                rospy.loginfo('%s', self._answer)
-                self._diagnostics.count('measurements stored')
-            except (ValueError, OSError) as error:
-                done, self._answer = False, 'not saved: %s' % error
-                self._diagnostics.warn('measurements not stored', self._answer)
-            return done, self._answer
+        return self._change_session(self._stored, 'saved')
 
     def delete_last(self):
         """Delete the newest measurement that this node has stored. Returns whether it was deleted, and a message."""
+        return self._change_session(self._deleted, 'deleted')
+
+    def _change_session(self, change, what):
         with self._capture_lock:
             try:
-                if not self._stored_ids:
-                    raise ValueError('no measurement was stored since the start')
-                remove(self._params.session, self._stored_ids[-1])
-                done, self._answer = True, 'deleted %s' % self._stored_ids.pop()
+                done, self._answer = True, change()
                 rospy.loginfo('%s', self._answer)
+                self._diagnostics.count('measurements %s' % what)
             except (ValueError, OSError) as error:
-                done, self._answer = False, 'not deleted: %s' % error
-                rospy.logwarn('%s', self._answer)
+                done, self._answer = False, 'not %s: %s' % (what, error)
+                self._diagnostics.warn('measurements not %s' % what, self._answer)
             return done, self._answer
+
+    def _deleted(self):
+        """Delete the newest measurement of this node and return a message. Raises ValueError or OSError on failure."""
+        if not self._stored_ids:
+            raise ValueError('no measurement was stored since the start')
+        remove(self._params.session, self._stored_ids[-1])
+        return 'deleted %s' % self._stored_ids.pop()
 
     def _stored(self):
         """Store the newest snapshot and return a message about it. Raises ValueError or OSError on failure."""

@@ -132,6 +132,14 @@ def outlier_of(name, likely, measured_m, truth_m):
     return Outlier(name, np.asarray(measured_m), np.asarray(truth_m), likely.corrected_slip(measured_m, truth_m))
 
 
+def outliers_of(names, measured_m, truth_m):
+    """Outlier or None of each position among measured positions (n, 2) with true positions (n, 2)."""
+    likely = likely_errors(measured_m, truth_m)
+    plausible = likely.are_plausible(measured_m, truth_m)
+    return [None if is_plausible else outlier_of(name, likely, *positions_m)
+            for is_plausible, name, *positions_m in zip(plausible, names, measured_m, truth_m)]
+
+
 def position_text(position_m):
     """Format a position (x, z) in millimetres."""
     return ('X %.0f, Z %.0f mm' % tuple(1000 * np.asarray(position_m, float) + 0.0)).replace('-', '\u2212')

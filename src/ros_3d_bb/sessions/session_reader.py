@@ -16,10 +16,13 @@ import numpy as np
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.distortion import PLUMB_BOB
 from ros_3d_bb.camera.images import DepthImage
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb.estimation.box3d_estimator import level_rotation
+from ros_3d_bb.estimation.box3d import plausible, truncated_edges
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, level_rotation
 
 FILE_NAME = 'frames.json'
+NEW, ANNOTATED, REJECTED, NOBODY = 'new', 'annotated', 'rejected', 'nobody found'  # states of a measurement
 SAME_PERSON_IOU = 0.3  # low, because a detector may find half of a body; boxes of two people seldom overlap so much
 
 
@@ -31,8 +34,8 @@ class RecordedDetection(NamedTuple):
     """Detected person in an image. Values that are not stored are None.
 
     `box_px` is (x1, y1, x2, y2), `estimate_m` (x, y, z) in the optical frame, `size_m` (width, height). `support` and
-    `truncated` are those of box3d.Box3D. `by_hand`: a user drew the box. `truth_m` (x, z) and `truth_y_m` are
-    the ground truth of this person, unless it is that of the measurement.
+    `truncated` are those of box3d.Box3D. `by_hand`: a user drew the box. `truth_m` is the ground truth of this person
+    as of a Measurement, unless it is stored there.
     """
 
     box_px: Optional[Tuple[int, int, int, int]]
@@ -41,30 +44,29 @@ class RecordedDetection(NamedTuple):
     support: Optional[float] = None
     truncated: Optional[bool] = None
     by_hand: bool = False
-    truth_m: Optional[np.ndarray] = None
-    truth_y_m: Optional[float] = None
+    truth_m: Optional[Tuple[float, Optional[float], float]] = None
 
 
 class Measurement(NamedTuple):
     """One measurement.
 
-    `person` is the index of the detection that the ground truth belongs to; `truth_m` (x, z) and `truth_y_m` are in the
-    optical frame; None if not annotated. `rejected` is the reason why the measurement is excluded, or None. `stamp_ns`
-    is the stamp of the image, or None if not stored. `up` is the unit vector that points up, in the optical frame, or
-    None if unknown.
+    `person` is the index of the selected detection, None without detections, and `truth_m` its true position (x, y, z)
+    in the optical frame, where y may be None; None if not annotated. `rejected` is the reason why the measurement is
+    excluded, or None. `stamp_ns` is the stamp of the image, or None if not stored. `up` is the unit vector that points
+    up, in the optical frame, or None if unknown. `problem` is the fault of an invalid entry, or None.
     """
 
     id: str
-    color_path: str
-    depth_path: str
-    detections: Tuple[RecordedDetection, ...]
-    person: int = 0
-    truth_m: Optional[np.ndarray] = None
-    truth_y_m: Optional[float] = None
+    color_path: str = ''
+    depth_path: str = ''
+    detections: Tuple[RecordedDetection, ...] = ()
+    person: Optional[int] = None
+    truth_m: Optional[Tuple[float, Optional[float], float]] = None
     rejected: Optional[str] = None
     stamp_ns: Optional[int] = None
     label: str = ''
     up: Optional[np.ndarray] = None
+    problem: Optional[str] = None
 
     @property
     def level_from_camera(self):
@@ -73,7 +75,7 @@ class Measurement(NamedTuple):
 
     @property
     def boxes_px(self):
-        """2D boxes of the people, beginning with the annotated person; empty if the box of that person is not stored.
+        """2D boxes of the people, beginning with the selected person; empty if the box of that person is not stored.
 
         A box drawn by hand replaces detected boxes of the same person.
         """
@@ -90,9 +92,41 @@ class Measurement(NamedTuple):
         return '%s (%s)' % (self.id, self.label) if self.label else self.id
 
     @property
+    def stamp_text(self):
+        """Stamp as '<secs>.<nsecs>', or '' if it is not stored."""
+        return '' if self.stamp_ns is None else '%d.%09d' % divmod(self.stamp_ns, NS)
+
+    @property
     def estimate_m(self):
-        """Stored position (3,) of the annotated person, or None."""
+        """Stored position (3,) of the selected person, or None."""
         return self.detections[self.person].estimate_m if self.detections else None
+
+    def truncated_edges(self, camera):
+        """Whether the left, upper, right and lower image border truncates the box of the selected person."""
+        return truncated_edges(self.boxes_px[0], (0, 0) + camera[:2]) if self.boxes_px else (False,) * 4
+
+    def estimate(self, depth, camera, estimator):
+        """Estimate the Box3D of the selected person, considering the boxes of other people; None if there is none."""
+        boxes = estimate_boxes(depth, self.boxes_px, camera, estimator, self.level_from_camera)
+        return plausible(boxes[0]) if boxes else None
+
+    @property
+    def state(self):
+        """NEW, ANNOTATED, REJECTED or NOBODY."""
+        if self.rejected is not None:
+            return REJECTED
+        if not self.detections and self.problem is None:
+            return NOBODY
+        return ANNOTATED if self.truths else NEW
+
+    @property
+    def is_done(self):
+        return self.state in (ANNOTATED, REJECTED)
+
+    @property
+    def truths(self):
+        """True positions (x, y, z) by the index of their detection."""
+        return {one.person: one.truth_m for one in annotated_people([self]) if one.person is not None}
 
 
 class Session(NamedTuple):
@@ -110,30 +144,19 @@ def read_session(folder, on_left_out=None):
     Raises SessionError if the folder is not a session, or a field is missing or invalid. With `on_left_out`, invalid
     frames are left out as rejected ones are, and it is called with their names and reasons.
     """
-    content, path = read_description(folder), os.path.join(str(folder), FILE_NAME)
-    frames = []
-    with session_errors(path):
-        camera = camera_of(content)
-        for number, entry in enumerate(content['frames'], 1):
-            if isinstance(entry, dict) and entry.get('rejected'):
-                if on_left_out is not None:
-                    on_left_out(name_of(entry, number), 'rejected: %s' % entry['rejected'])
-                continue
-            try:
-                with session_errors('%s, measurement number %d' % (path, number)):
-                    frames.append(frame_of(str(folder), entry))
-            except SessionError as error:
-                if on_left_out is None:
-                    raise
-                on_left_out(name_of(entry, number), str(error))
-        return Session(*camera, tuple(frames))
-
-
-def name_of(entry, number):
-    """ID and label of an entry of a description, or its number if it has no ID."""
-    if not isinstance(entry, dict) or not entry.get('id'):
-        return 'measurement number %d' % number
-    return '%s (%s)' % (entry['id'], entry['label']) if entry.get('label') else str(entry['id'])
+    content, frames = read_description(folder), []
+    with session_errors(os.path.join(str(folder), FILE_NAME)):
+        session = Session(*camera_of(content), ())
+    for number, entry in enumerate(content['frames'], 1):
+        frame = measurement_of(str(folder), entry)
+        if frame.rejected is None and frame.problem is None:
+            frames.append(frame)
+        elif on_left_out is not None:
+            on_left_out(frame.name if frame.id else 'measurement number %d' % number,
+                        frame.problem if frame.rejected is None else 'rejected: %s' % frame.rejected)
+        elif frame.rejected is None:
+            raise SessionError('%s, measurement number %d: %s' % (folder, number, frame.problem))
+    return session._replace(frames=tuple(frames))
 
 
 def annotated_people(frames):
@@ -143,7 +166,7 @@ def annotated_people(frames):
             yield frame
         for number, detection in enumerate(frame.detections):
             if number != frame.person and detection.truth_m is not None:
-                yield frame._replace(person=number, truth_m=detection.truth_m, truth_y_m=detection.truth_y_m)
+                yield frame._replace(person=number, truth_m=detection.truth_m)
 
 
 def read_description(folder):
@@ -183,20 +206,30 @@ def camera_of(content):
                    distortion=camera.get('distortion', ())), float(camera['depth_scale']), str(camera['frame']))
 
 
-def frame_of(folder, entry):
-    """Measurement of an entry of a description. For exceptions see `session_errors`."""
+def measurement_of(folder, entry):
+    """Measurement of an entry of a description; that of an invalid entry has a `problem`."""
+    try:
+        with session_errors(FILE_NAME):
+            return _valid_measurement(folder, entry)
+    except SessionError as error:
+        known = entry if isinstance(entry, dict) else {}
+        return Measurement(str(known.get('id', '')), rejected=str(known['rejected']) if known.get('rejected') else None,
+                           label=str(known.get('label', '')), problem=str(error))
+
+
+def _valid_measurement(folder, entry):
     if not isinstance(entry, dict):
         raise ValueError('a measurement is %.60r; an object expected' % (entry,))
     # sessions with one box per frame store the fields of the detection in the frame
     detections = entry.get('detections') or ([entry] if {'box', 'estimate_mm', 'original_mm'} & set(entry) else [])
-    person, truth_mm, stamp = int(entry.get('person', 0)), entry.get('truth_mm'), entry.get('stamp')
+    person, stamp = int(entry.get('person', 0)), entry.get('stamp')
     if not 0 <= person < max(1, len(detections)):
         raise ValueError('person is %d, but there are %d detections' % (person, len(detections)))
     return Measurement(
         str(entry['id']), os.path.join(folder, entry['color']), os.path.join(folder, entry['depth']),
-        tuple(_detection_from(detection) for detection in detections), person, *_truth_from(truth_mm),
-        str(entry['rejected']) if entry.get('rejected') else None, None if stamp is None else _stamp_ns_from(stamp),
-        str(entry.get('label', '')), _up_from(entry.get('up')))
+        tuple(_detection_from(detection) for detection in detections), person if detections else None,
+        _truth_from(entry.get('truth_mm')), str(entry['rejected']) if entry.get('rejected') else None,
+        None if stamp is None else _stamp_ns_from(stamp), str(entry.get('label', '')), _up_from(entry.get('up')))
 
 
 def read_color(frame, camera):
@@ -243,15 +276,15 @@ def _detection_from(entry):
                              estimate_m, _metres(entry.get('size_mm'), 2),
                              None if support is None else float(_numbers([support], 1)[0]),
                              None if truncated is None else bool(truncated), entry.get('by') == 'hand',
-                             *_truth_from(entry.get('truth_mm') if 'color' not in entry else None))
+                             _truth_from(entry.get('truth_mm') if 'color' not in entry else None))
 
 
 def _truth_from(truth_mm):
-    """(x, z) and y in metres of a field truth_mm; None if missing."""
+    """(x, y, z) in metres of a field truth_mm, where y may be None; None if it is missing."""
     if truth_mm is None:
-        return None, None
-    y_mm = truth_mm.get('y')
-    return _metres([truth_mm['x'], truth_mm['z']], 2), None if y_mm is None else float(_metres([y_mm], 1)[0])
+        return None
+    (x_m, z_m), y_mm = _metres([truth_mm['x'], truth_mm['z']], 2).tolist(), truth_mm.get('y')
+    return x_m, None if y_mm is None else float(_metres([y_mm], 1)[0]), z_m
 
 
 def _up_from(values):
@@ -268,7 +301,7 @@ def _stamp_ns_from(text):
     match = re.match(r'([0-9]{1,12})\.([0-9]{9})$', str(text))
     if match is None:
         raise ValueError('stamp is %.40r; seconds, a point and nine digits of nanoseconds expected' % (text,))
-    return int(match.group(1)) * 10 ** 9 + int(match.group(2))
+    return int(match.group(1)) * NS + int(match.group(2))
 
 
 def _metres(values_mm, count):

@@ -15,7 +15,7 @@ import numpy as np
 from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.atomic_file import atomic_write
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.sessions.session_reader import FILE_NAME, read_description, read_session
+from ros_3d_bb.sessions.session_reader import FILE_NAME, camera_of, read_description, session_errors
 
 MILLIMETRE = 0.001
 MAX_DEPTH_MM = 65535  # largest value in 16 bits
@@ -39,7 +39,7 @@ def append(folder, snapshot, label=''):
     written = []
     try:
         with locked_update(folder) as content:
-            _check_camera(folder, snapshot, depth.scale_m)
+            _check_camera(folder, content, snapshot, depth.scale_m)
             content.setdefault('camera', _camera_entry(snapshot, depth.scale_m))
             name = _next_id(content['frames'], snapshot.stamp_ns)
             entry = {'id': name, 'color': 'color/%s.png' % name, 'depth': 'depth/%s.png' % name,
@@ -108,21 +108,21 @@ def stored_depth(depth):
     return DepthImage(np.where(valid, depth_mm, 0).astype(np.uint16), MILLIMETRE)
 
 
-def _check_camera(folder, snapshot, scale_m):
-    """Raise ValueError if the folder contains a session of another camera."""
-    if not os.path.exists(os.path.join(folder, FILE_NAME)):
+def _check_camera(folder, content, snapshot, scale_m):
+    """Raise ValueError if the description of a folder is that of a session of another camera."""
+    if content == {'frames': []}:
         return
-    session = read_session(folder)
-    for name, stored, actual in (('intrinsics', tuple(session.camera), tuple(snapshot.camera)),
-                                 ('depth scale', session.depth_scale_m, scale_m),
-                                 ('frame', session.frame_id, snapshot.color.frame_id)):
+    with session_errors(os.path.join(folder, FILE_NAME)):
+        cameras = zip(('intrinsics', 'depth scale', 'frame'), camera_of(content),
+                      (snapshot.camera, scale_m, snapshot.color.frame_id))
+    for name, stored, actual in cameras:
         if stored != actual:
             raise ValueError('the session in %s was recorded by another camera: its %s is %s, but this camera\'s is '
                              '%s; choose another folder' % (folder, name, stored, actual))
 
 
 def _next_id(entries, stamp_ns):
-    matches = [ID_FORMAT.match(str(entry['id'])) for entry in entries]
+    matches = [ID_FORMAT.match(str(entry.get('id'))) for entry in entries if isinstance(entry, dict)]
     numbers = [int(match.group(1)) for match in matches if match]
     return '%05d_%d_%09d' % ((max([len(entries)] + numbers) + 1,) + divmod(stamp_ns, NS))
 

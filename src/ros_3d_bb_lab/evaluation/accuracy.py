@@ -9,8 +9,7 @@ from typing import Any, NamedTuple, Optional
 import numpy as np
 
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb.estimation.box3d import plausible, truncated_edges
-from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
+from ros_3d_bb.estimation.box3d_estimator import estimator_named
 from ros_3d_bb.estimation.error_model import read_error_model, write_error_model
 from ros_3d_bb.sessions.session_reader import annotated_people, read_color, read_depth, read_session
 from ros_3d_bb_lab.evaluation.defaults import data_folder, default_weights
@@ -31,29 +30,24 @@ class Estimates(NamedTuple):
     covariances: Optional[Any]
 
 
-def boxes_of(session, weights=None):
-    """2D box of the annotated person in each frame, or None: the recorded one, or with `weights` that of YOLOv5.
-
-    Raises ValueError if a frame with ground truth has no recorded box.
-    """
-    for frame in session.frames:
-        if not frame.boxes_px:
-            raise ValueError('frame %s has no 2D box; all frames with ground truth need one' % frame.id)
-    if weights is None:
-        return [frame.boxes_px[0] for frame in session.frames]
+def with_detected_boxes(session, weights):
+    """The session with boxes of YOLOv5 of the annotated people; None for those who are not detected."""
     from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_detector  # may import torch (slow)
-    detector, chosen = open_detector(weights, running=RuntimeParams(device='cpu')), []
+    detector, frames = open_detector(weights, running=RuntimeParams(device='cpu')), []
     for frame in session.frames:
         boxes = detector.detect(read_color(frame, session.camera)).boxes
         overlaps = iou(frame.boxes_px[0], boxes)
         found = len(boxes) > 0 and overlaps.max() > 0
-        chosen.append(tuple(np.rint(boxes[overlaps.argmax()]).astype(int).tolist()) if found else None)
-    return chosen
+        box_px = tuple(np.rint(boxes[overlaps.argmax()]).astype(int).tolist()) if found else None
+        detections = list(frame.detections)
+        detections[frame.person] = detections[frame.person]._replace(box_px=box_px)
+        frames.append(frame._replace(detections=tuple(detections)))
+    return session._replace(frames=tuple(frames))
 
 
-def _estimates_of(session, boxes, estimator, model=None):
+def _estimates_of(session, estimator, model=None):
     """Estimates corrected by an error model, by default one fitted to all other positions for each position."""
-    raw_m, truth_m = _raw_positions(session, boxes, estimator), truth_of(session)
+    raw_m, truth_m = _raw_positions(session, estimator), truth_of(session)
     seen = np.isfinite(raw_m[:, 0])
     position_m, covariances = raw_m.copy(), np.full(raw_m.shape + (3,), np.nan)
     if model is not None:
@@ -64,20 +58,14 @@ def _estimates_of(session, boxes, estimator, model=None):
     return Estimates(raw_m, position_m, covariances)
 
 
-def _raw_positions(session, boxes, estimator):
+def _raw_positions(session, estimator):
     """Estimated position in each frame, (n, 3), NaN if there is no estimate, considering the boxes of other people."""
-    raw_m = np.full((len(boxes), 3), np.nan)
-    for number, (frame, rect_px) in enumerate(zip(session.frames, boxes)):
-        if rect_px is not None:
-            rects_px = [rect_px] + list(frame.boxes_px[1:])
-            box = estimate_boxes(read_depth(frame, session), rects_px, session.camera, estimator,
-                                 frame.level_from_camera)[0]
-            raw_m[number] = box.center_m if plausible(box) else np.nan
-    return raw_m
+    boxes = [frame.estimate(read_depth(frame, session), session.camera, estimator) for frame in session.frames]
+    return np.array([np.full(3, np.nan) if box is None else box.center_m for box in boxes])
 
 
 def truth_of(session):
-    return np.array([frame.truth_m for frame in session.frames])
+    return np.array([frame.truth_m[::2] for frame in session.frames])
 
 
 def scores_of(estimates, truth_m, truncated):
@@ -104,15 +92,14 @@ def _repeatability_m(error_m, truth_m):
     return np.sqrt(np.mean(variances, axis=0)) if variances else np.full(2, np.nan)
 
 
-def compare(session, boxes, estimator, model=None):
+def compare(session, estimator, model=None):
     """Compare the estimators on a session. Returns scores and positions as a dictionary, and our `Estimates`."""
     truth_m = truth_of(session)
-    truncated = np.array([any(truncated_edges(rect_px or frame.boxes_px[0], (0, 0) + session.camera[:2]))
-                          for rect_px, frame in zip(boxes, session.frames)])
-    ours = _estimates_of(session, boxes, estimator, model)
-    thesis = _thesis_estimates(session, boxes)
-    recorded_m = np.array([np.full(3, np.nan) if frame.estimate_m is None or rect_px is None else frame.estimate_m
-                           for rect_px, frame in zip(boxes, session.frames)])
+    truncated = np.array([any(frame.truncated_edges(session.camera)) for frame in session.frames])
+    ours = _estimates_of(session, estimator, model)
+    thesis = _thesis_estimates(session)
+    recorded_m = np.array([np.full(3, np.nan) if frame.estimate_m is None or not frame.boxes_px else frame.estimate_m
+                           for frame in session.frames])
     recorded = Estimates(recorded_m, recorded_m, None) if np.isfinite(recorded_m[:, 0]).any() else None
     names = 'ours', 'thesis', 'truth', 'ours_raw', 'thesis_raw'
     rows = zip(session.frames, ours.position_m, thesis.position_m, truth_m, ours.raw_m, thesis.raw_m)
@@ -126,12 +113,12 @@ def compare(session, boxes, estimator, model=None):
                           for frame, *values in rows]}, ours
 
 
-def _thesis_estimates(session, boxes):
+def _thesis_estimates(session):
     """Estimates of the thesis' estimator, uncorrected if there are too few positions."""
     try:
-        return _estimates_of(session, boxes, estimator_named('median'))
+        return _estimates_of(session, estimator_named('median'))
     except ValueError:
-        raw_m = _raw_positions(session, boxes, estimator_named('median'))
+        raw_m = _raw_positions(session, estimator_named('median'))
         return Estimates(raw_m, raw_m, None)
 
 
@@ -152,8 +139,12 @@ def run(arguments):
     model = read_error_model(arguments.error_model) if arguments.error_model else None
     if model is not None:
         model.check_estimator(arguments.estimator)
-    boxes = boxes_of(session, arguments.weights if arguments.boxes == 'yolov5' else None)
-    result, ours = compare(session, boxes, estimator_named(arguments.estimator), model)
+    for frame in session.frames:
+        if not frame.boxes_px:
+            raise ValueError('frame %s has no 2D box; all frames with ground truth need one' % frame.id)
+    if arguments.boxes == 'yolov5':
+        session = with_detected_boxes(session, arguments.weights)
+    result, ours = compare(session, estimator_named(arguments.estimator), model)
     result.update(boxes=arguments.boxes, estimator=arguments.estimator)
     if arguments.fit:
         seen = np.isfinite(ours.raw_m[:, 0])

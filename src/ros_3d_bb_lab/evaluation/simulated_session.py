@@ -4,13 +4,14 @@ People of different builds stand on a grid of positions or walk across them in r
 the session as any other.
 """
 import argparse
-import json
-import os
 
-import cv2
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import transform_points
+from ros_3d_bb.camera.images import DepthImage
+from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.sessions.session_writer import append, locked_update
+from ros_3d_bb.sessions.snapshots import ColorImage, Snapshot
 from ros_3d_bb_lab.simulation.scenario import Move, Person, Robot, Room, Scenario
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
 
@@ -24,31 +25,24 @@ REPETITIONS = 3
 
 def write_simulated_session(folder, ranges_m=RANGES_M, tangents=TANGENTS, repetitions=REPETITIONS):
     """Write a session of simulated people with exact 2D boxes, except outside the image. Returns the folder."""
-    for name in ('color', 'depth'):
-        os.makedirs(os.path.join(folder, name), exist_ok=True)
     positions_m = [(z_m, round(tangent * z_m, 3)) for z_m in ranges_m for tangent in tangents]
-    frames = [_write_frame(folder, number, *positions_m[number // repetitions])
-              for number in range(len(positions_m) * repetitions)]
-    camera = dict(D435I_COLOR._asdict(), distortion=[0] * 5, depth_scale=0.001, frame='camera_color_optical_frame')
-    with open(os.path.join(folder, 'frames.json'), 'w') as stream:
-        json.dump({'camera': camera, 'frames': [frame for frame in frames if frame is not None]}, stream, indent=1)
+    for number in range(len(positions_m) * repetitions):
+        _append_frame(folder, number, *positions_m[number // repetitions])
     return folder
 
 
-def _write_frame(folder, number, z_m, x_m):
-    """Render a person at a position in the camera frame. Returns None if the person is not in the image."""
+def _append_frame(folder, number, z_m, x_m):
+    """Append the image of a person at a position in the camera frame, unless the person is outside of the image."""
     simulator = Simulator(_scenario(np.array([ROBOT.pose[0] + ROBOT.mount[0] + z_m, ROBOT.pose[1] - x_m]), number))
     frame = simulator.frame(simulator.frame_count - 1)
     person = frame.people[0]
     if person.box_px is None:
-        return None
-    name = '%04d.png' % number
-    cv2.imwrite(os.path.join(folder, 'color', name), frame.color[..., ::-1])
-    cv2.imwrite(os.path.join(folder, 'depth', name), frame.depth_mm)
-    truth_m = transform_points(np.linalg.inv(frame.poses.map_from_camera), person.position_m)
-    return {'id': '%04d' % number, 'color': 'color/' + name, 'depth': 'depth/' + name,
-            'box': [int(edge) for edge in person.box_px],
-            'truth_mm': {'x': round(1000 * truth_m[0]), 'z': round(1000 * truth_m[2])}}
+        return
+    append(folder, Snapshot(number * NS, ColorImage(frame.color, 'camera_color_optical_frame'),
+                            DepthImage(frame.depth_mm, 0.001), D435I_COLOR, (tuple(person.box_px),), None))
+    x_m, _y_m, z_m = transform_points(np.linalg.inv(frame.poses.map_from_camera), person.position_m)
+    with locked_update(folder) as content:
+        content['frames'][-1]['truth_mm'] = {'x': round(1000 * x_m), 'z': round(1000 * z_m)}
 
 
 def _scenario(position_m, number):

@@ -10,7 +10,7 @@ import sys
 from ros_3d_bb.estimation.error_model import RECORDED, write_error_model
 from ros_3d_bb_lab.evaluation.noise.analysis import Inputs, analyse
 from ros_3d_bb_lab.evaluation.noise.recordings import fit_recordings
-from ros_3d_bb_lab.evaluation.noise.report import text_of, write_results
+from ros_3d_bb_lab.evaluation.noise.report import write_results
 from ros_3d_bb_lab.evaluation.noise.tables import read_session_measurements, read_table
 from ros_3d_bb_lab.evaluation.tracking.recorded_detections import read_recordings
 
@@ -22,18 +22,11 @@ def main():
     try:
         if arguments.recordings:
             return _fit_recordings(arguments, folder)
-        inputs = _inputs(arguments)
-        for outlier in inputs.outliers:
-            print('left out of the analysis:', outlier, file=sys.stderr)
-        analysis = analyse(inputs)
+        analysis = analyse(_inputs(arguments))
         write_results(folder, analysis)
     except (ValueError, OSError) as error:
         sys.exit('./run noise: %s' % error)
-    print(text_of(analysis))
-    if analysis.model_note:
-        print('./run noise: note: %s' % analysis.model_note, file=sys.stderr)
-    print('detector: not measured, default values; --recordings measures it')
-    print('report: %s' % (folder / 'report.html'))
+    analysis.print_results(folder)
 
 
 def _fit_recordings(arguments, folder):
@@ -53,11 +46,11 @@ def _inputs(arguments):
     """Read the measurements that the arguments name. Raises ValueError."""
     if arguments.session:
         estimator = arguments.estimator or 'foreground'
-        session = read_session_measurements(arguments.session, estimator)
-        return Inputs.of_session(session, estimator, arguments.camera)
-    z, x = read_table(arguments.z, 'Z'), read_table(arguments.x, 'X')
-    x_variance = read_table(arguments.x_variance, 'X') if arguments.x_variance else x
-    return Inputs.of_tables(z, x, x_variance, arguments.estimator or '', arguments.camera)
+        z = x = x_variance = read_session_measurements(arguments.session, estimator)
+    else:
+        estimator, z, x = arguments.estimator or '', read_table(arguments.z, 'Z'), read_table(arguments.x, 'X')
+        x_variance = read_table(arguments.x_variance, 'X') if arguments.x_variance else x
+    return Inputs.of(z, x, x_variance, estimator, arguments.camera)
 
 
 def _arguments():

@@ -1,10 +1,10 @@
 """Noise analysis: moments and a normality test of clusters of errors, and the resulting error model."""
 import datetime
 import os
+import sys
 from typing import NamedTuple, Optional, Tuple
 
 import numpy as np
-from scipy import stats
 
 from ros_3d_bb.estimation.error_model import ErrorModel
 from ros_3d_bb.sessions.plausibility import Outlier
@@ -12,44 +12,19 @@ from ros_3d_bb_lab.evaluation.error_model_fit import fit_error_model
 from ros_3d_bb_lab.evaluation.noise.tables import MeasurementTable, clusters_of
 
 Z_DEGREE, X_DEGREE = 2, 1
-SIGNIFICANCE = 0.05  # of the normality test
-LEAST_TO_TEST = 8  # measurements
-
-
-class ClusterStatistics(NamedTuple):
-    """Statistics of one cluster, in metres.
-
-    `variance_m2` is divided by n, as in the thesis. `shapiro_p` is the result of the Shapiro-Wilk test; None if all
-    errors are equal, or if there are fewer than 8.
-    """
-
-    truth_m: float
-    count: int
-    mean_m: float
-    variance_m2: float
-    rms_m: float
-    shapiro_p: Optional[float] = None
-
-    @property
-    def sigma_m(self):
-        return float(np.sqrt(self.variance_m2))
-
-    @property
-    def tested(self):
-        """Whether there were enough measurements for the test."""
-        return self.shapiro_p is not None
-
-    @property
-    def looks_gaussian(self):
-        """Whether the test does not reject a Gaussian at 5 %."""
-        return self.tested and self.shapiro_p >= SIGNIFICANCE
+LEAST_IN_CLUSTER = 3  # measurements
+SUMMARY = 'truth_m', 'count', 'mean_m', 'variance_m2', 'rms_m', 'shapiro_p'  # of a cluster
 
 
 class AxisStatistics(NamedTuple):
-    """Clusters of one axis, and the polynomial of their mean error by true value, highest power first."""
+    """Clusters of one axis, and the polynomial of their mean error by true value, highest power first.
+
+    It is fitted with equal weights of the clusters, as in the thesis. `small` clusters are left out.
+    """
 
     poly: tuple
     clusters: tuple
+    small: tuple
 
     @property
     def max_variance_m2(self):
@@ -59,21 +34,27 @@ class AxisStatistics(NamedTuple):
     def max_sigma_m(self):
         return float(np.sqrt(self.max_variance_m2))
 
+    def poly_text(self, variable):
+        """The polynomial in mathematical notation: −0.040 z² + 0.060 z + 0.008."""
+        text = ''
+        for power, value in zip(range(len(self.poly) - 1, -1, -1), self.poly):
+            sign = ('−' if value < 0 else '+') if text else ('−' if value < 0 else '')
+            term = ('%.3f' % abs(value)) + {0: '', 1: ' ' + variable, 2: ' %s²' % variable}[power]
+            text += (' %s ' % sign if text else sign) + term
+        return text
 
-def axis_statistics(clusters, degree):
-    """Compute the statistics of clusters, and fit a polynomial to their means with equal weights (as in the thesis)."""
-    described = tuple(cluster_statistics(cluster) for cluster in clusters)
-    poly = np.polyfit([cluster.truth_m for cluster in described], [cluster.mean_m for cluster in described], degree)
-    return AxisStatistics(tuple(poly.tolist()), described)
 
-
-def cluster_statistics(cluster):
-    error_m = cluster.error_m
-    found = ClusterStatistics(cluster.truth_m, len(error_m), float(error_m.mean()), float(error_m.var()),
-                              float(np.sqrt((error_m ** 2).mean())))
-    if len(error_m) < LEAST_TO_TEST or np.ptp(error_m) == 0:
-        return found
-    return found._replace(shapiro_p=float(stats.shapiro(error_m)[1]))
+def axis_statistics(table, axis, degree):
+    """Statistics of an axis, 'X' or 'Z'. Raises ValueError if there are too few clusters."""
+    found = clusters_of(table, axis)
+    clusters = tuple(cluster for cluster in found if cluster.count >= LEAST_IN_CLUSTER)
+    if len(clusters) <= degree:
+        raise ValueError('%s: at least %d measurements at each of %d values of %s true needed; there are %s' % (
+            table.name, LEAST_IN_CLUSTER, degree + 1, axis, ', '.join(
+                '%d at %g m' % (cluster.count, cluster.truth_m) for cluster in found) or 'none'))
+    poly = np.polyfit([cluster.truth_m for cluster in clusters], [cluster.mean_m for cluster in clusters], degree)
+    return AxisStatistics(tuple(poly.tolist()), clusters,
+                          tuple(cluster for cluster in found if cluster.count < LEAST_IN_CLUSTER))
 
 
 class Inputs(NamedTuple):
@@ -90,20 +71,14 @@ class Inputs(NamedTuple):
     outliers: Tuple[Outlier, ...] = ()
 
     @classmethod
-    def of_tables(cls, z, x, x_variance, estimator, camera):
-        """Inputs without the outliers of the tables."""
+    def of(cls, z, x, x_variance, estimator, camera):
+        """Inputs without the outliers of the tables, which may be the same table, and for the variance without
+        truncated people."""
         found = [table.outliers() for table in (z, x, x_variance)]
-        unique = {(table.name, outlier.name): outlier for table, outliers in zip((z, x, x_variance), found)
-                  for outlier in outliers}
-        tables = (table.without(outliers) for table, outliers in zip((z, x, x_variance), found))
-        return cls(*tables, estimator, camera, tuple(unique.values()))
-
-    @classmethod
-    def of_session(cls, measurements, estimator, camera):
-        """Inputs from one table without its outliers."""
-        outliers = measurements.outliers()
-        plausible = measurements.without(outliers)
-        return cls(plausible, plausible, plausible.whole(), estimator, camera, outliers)
+        unique = {(table.name, outlier.name, *outlier.truth_m.tolist()): outlier
+                  for table, outliers in zip((z, x, x_variance), found) for outlier in outliers}
+        z, x, x_variance = (table.without(outliers) for table, outliers in zip((z, x, x_variance), found))
+        return cls(z, x, x_variance.whole(), estimator, camera, tuple(unique.values()))
 
 
 class Analysis(NamedTuple):
@@ -122,22 +97,28 @@ class Analysis(NamedTuple):
     date: str
 
     @property
-    def variance_clusters(self):
-        """Pairs (axis, ClusterStatistics) of the clusters that the variances are computed from."""
-        return [(name, cluster) for name, axis in (('Z', self.z), ('X', self.x_variance)) for cluster in axis.clusters]
-
-    @property
     def model_note(self):
         """Why there is no error model; '' if there is one."""
         return '' if self.model is not None else 'no error_model.yaml is written: %s' % self.no_model
 
+    def print_results(self, folder):
+        """Print mean error and standard deviation of both axes, what is left out, and the path of the report."""
+        for outlier in self.inputs.outliers:
+            print('left out of the analysis:', outlier, file=sys.stderr)
+        for name, axis, spread in (('z', self.z, self.z), ('x', self.x, self.x_variance)):
+            print('f(%s) = %s, largest variance %.5f m², standard deviation %.4f m' % (
+                name, axis.poly_text(name), spread.max_variance_m2, spread.max_sigma_m))
+        if self.model_note:
+            print('note:', self.model_note, file=sys.stderr)
+        print('detector: not measured, default values; ./run noise --recordings measures it')
+        print('report: %s' % (folder / 'report.html'))
+
 
 def analyse(inputs):
     """Analyse `inputs`, and return an Analysis. Raises ValueError if there are too few measurements."""
-    z, x = (axis_statistics(clusters_of(table, axis, degree + 1), degree) for table, axis, degree in (
-        (inputs.z, 'Z', Z_DEGREE), (inputs.x, 'X', X_DEGREE)))
+    z, x = axis_statistics(inputs.z, 'Z', Z_DEGREE), axis_statistics(inputs.x, 'X', X_DEGREE)
     try:
-        x_variance = axis_statistics(clusters_of(inputs.x_variance, 'X', X_DEGREE + 1), X_DEGREE)
+        x_variance = axis_statistics(inputs.x_variance, 'X', X_DEGREE)
     except ValueError as error:
         raise ValueError('%s, without people who are truncated by the left or right image border' % error)
     names = set(os.path.basename(os.path.abspath(table.name)) for table in (inputs.z, inputs.x, inputs.x_variance))
@@ -165,4 +146,4 @@ def summary_of(analysis):
 
 def _axis_summary(axis):
     return {'poly': list(axis.poly), 'max_variance_m2': axis.max_variance_m2, 'max_sigma_m': axis.max_sigma_m,
-            'clusters': [dict(cluster._asdict()) for cluster in axis.clusters]}
+            'clusters': [{name: getattr(cluster, name) for name in SUMMARY} for cluster in axis.clusters]}

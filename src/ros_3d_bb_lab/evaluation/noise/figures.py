@@ -1,9 +1,7 @@
-"""Figures of the noise analysis as PNG files."""
+"""Figures of the noise analysis, each drawn to a PNG file."""
 import matplotlib
 import numpy as np
 from scipy import stats
-
-from ros_3d_bb_lab.evaluation.noise.tables import clusters_of
 
 matplotlib.use('Agg')  # works without a display
 import matplotlib.pyplot as plt  # noqa: E402
@@ -14,44 +12,8 @@ MANY_CLUSTERS = 12
 MEASURED, FITTED = '#0072b2', '#d55e00'  # different for all colour vision
 
 
-def write_figures(folder, analysis):
-    """Write the figures as PNG files into a folder (pathlib.Path). Returns {name: caption} in the order of the report.
-    """
-    z, x, tables = analysis.z, analysis.x, analysis.inputs
-    drawings = [
-        ('layout.png', 'true positions (number of measurements) and estimates, from above', _layout, (tables.z,)),
-        ('z_error.png', 'error in Z by true Z, and f(z)', _error_by_truth, (z, 'Z')),
-        ('z_variance.png', 'variance of the error in Z by true Z', _variances, (z, 'Z')),
-        ('x_error.png', 'error in X by true X, and f(x)', _error_by_truth, (x, 'X')),
-        ('x_variance.png', 'variance of the error in X by true X', _variances, (analysis.x_variance, 'X')),
-        ('sigma.png', 'standard deviation of the error model by range, and remaining errors of the positions', _sigmas,
-         (analysis,)),
-        ('z_distribution.png', 'density of the error in Z, and the fitted Gaussian', _histograms,
-         (clusters_of(tables.z, 'Z'), 'Z')),
-        ('x_distribution.png', 'density of the error in X, and the fitted Gaussian', _histograms,
-         (clusters_of(tables.x_variance, 'X'), 'X'))]
-    if not len(tables.z.complete().truth_m):
-        drawings = drawings[1:]
-    if analysis.model is None:
-        drawings = [drawing for drawing in drawings if drawing[0] != 'sigma.png']
-    for name, _caption, draw, arguments in drawings:
-        draw(folder / name, *arguments)
-    return {name: caption for name, caption, _draw, _arguments in drawings}
-
-
-def polynomial_text(poly, variable):
-    """Format a polynomial in mathematical notation: −0.040 z² + 0.060 z + 0.008."""
-    text = ''
-    for power, value in zip(range(len(poly) - 1, -1, -1), poly):
-        sign = ('−' if value < 0 else '+') if text else ('−' if value < 0 else '')
-        term = ('%.3f' % abs(value)) + {0: '', 1: ' ' + variable, 2: ' %s²' % variable}[power]
-        text += (' %s ' % sign if text else sign) + term
-    return text
-
-
-def _layout(path, measurements):
+def layout(path, complete):
     """View from above: true positions with the number of their measurements, and the estimates."""
-    complete = measurements.complete()
     places_m, counts = np.unique(complete.truth_m, axis=0, return_counts=True)
     figure, axes = plt.subplots(figsize=(6.2, 4.8))
     axes.plot(complete.measured_m[:, 0], complete.measured_m[:, 2], '.', color=FITTED, label='estimate')
@@ -64,7 +26,7 @@ def _layout(path, measurements):
     _finish(figure, axes, path, 'X [m]', 'Z [m]', 'lower right')  # few measurements are beside the camera
 
 
-def _sigmas(path, analysis):
+def sigmas(path, analysis):
     """Standard deviations of the model by range, and the remaining mean errors of the positions."""
     model, complete = analysis.model, analysis.inputs.z.complete()
     error_m = model.corrected(complete.measured_m)[:, [0, 2]] - complete.truth_m
@@ -82,7 +44,7 @@ def _sigmas(path, analysis):
     _finish(figure, axes, path, 'true Z [m]', 'error [m]')
 
 
-def _error_by_truth(path, axis, name):
+def error_by_truth(path, axis, name):
     """Mean error by true value, with bars of one standard deviation, and the fitted polynomial."""
     truth_m = np.array([cluster.truth_m for cluster in axis.clusters])
     figure, axes = plt.subplots(figsize=SIZE_IN)
@@ -92,11 +54,11 @@ def _error_by_truth(path, axis, name):
                   label='mean ± one standard deviation')
     line_m = np.linspace(truth_m.min(), truth_m.max(), 100)
     axes.plot(line_m, np.polyval(axis.poly, line_m), color=FITTED,
-              label='f(%s) = %s' % (name.lower(), polynomial_text(axis.poly, name.lower())))
+              label='f(%s) = %s' % (name.lower(), axis.poly_text(name.lower())))
     _finish(figure, axes, path, 'true %s [m]' % name, '%s error [m]' % name)
 
 
-def _variances(path, axis, name):
+def variances(path, axis, name):
     """Variance of each cluster."""
     figure, axes = plt.subplots(figsize=SIZE_IN)
     positions = np.arange(len(axis.clusters))
@@ -111,16 +73,16 @@ def _variances(path, axis, name):
             'variance of the %s error [m²]' % name)
 
 
-def _histograms(path, clusters, name):
+def histograms(path, clusters, name):
     """Density of the errors of each cluster, with the fitted Gaussian."""
     rows = -(-len(clusters) // COLUMNS)
     figure, grid = plt.subplots(rows, COLUMNS, figsize=(9, 2.4 * rows), squeeze=False)
     for axes, cluster in zip(grid.ravel(), clusters):
-        mean_m, sigma_m = cluster.error_m.mean(), max(cluster.error_m.std(), 1e-6)
+        mean_m, sigma_m = cluster.mean_m, max(cluster.sigma_m, 1e-6)
         axes.hist(cluster.error_m, bins='sturges', density=True, color=MEASURED, alpha=0.6)
         line_m = mean_m + sigma_m * np.linspace(-3.5, 3.5, 100)
         axes.plot(line_m, stats.norm(mean_m, sigma_m).pdf(line_m), color=FITTED)
-        axes.set_title('%s = %.2f m, n = %d' % (name, cluster.truth_m, len(cluster.error_m)), fontsize=9)
+        axes.set_title('%s = %.2f m, n = %d' % (name, cluster.truth_m, cluster.count), fontsize=9)
         axes.tick_params(labelsize=8)
         axes.locator_params(axis='x', nbins=5)
     for axes in grid.ravel()[len(clusters):]:

@@ -6,10 +6,11 @@ import numpy as np
 from ros_3d_bb.estimation.error_model import write_error_model
 from ros_3d_bb.sessions.plausibility import position_text
 from ros_3d_bb_lab.evaluation.html_report import figure, heading, html_report, paragraph, table
-from ros_3d_bb_lab.evaluation.noise.analysis import LEAST_TO_TEST, summary_of
-from ros_3d_bb_lab.evaluation.noise.figures import polynomial_text, write_figures
-from ros_3d_bb_lab.evaluation.noise.tables import LEAST_IN_CLUSTER, small_clusters
+from ros_3d_bb_lab.evaluation.noise.analysis import LEAST_IN_CLUSTER, summary_of
+from ros_3d_bb_lab.evaluation.noise.figures import error_by_truth, histograms, layout, sigmas, variances
+from ros_3d_bb_lab.evaluation.noise.tables import LEAST_TO_TEST
 
+SIGNIFICANCE = 0.05  # of the normality test
 TITLE = 'Position errors of a depth camera'
 ESTIMATORS = {'foreground': 'foreground (that of bbox3d_node)', 'median': 'median (that of the thesis)',
               'recorded': 'recorded (as stored with the measurements)', '': 'unknown'}
@@ -21,9 +22,13 @@ def write_results(folder, analysis):
     The folder is created if it does not exist. The error model of an earlier analysis does not remain. Raises OSError.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    figures = {name: figure(folder / name, caption) for name, caption in write_figures(folder, analysis).items()}
+
+    def drawn(name, caption, draw, *arguments):
+        draw(folder / name, *arguments)
+        return figure(folder / name, caption)
+
     sections = _summary, _setup, _left_out, _z, _x, _model, _distributions
-    elements = [element for section in sections for element in section(analysis, figures)]
+    elements = [element for section in sections for element in section(analysis, drawn)]
     (folder / 'report.html').write_text(html_report(TITLE, elements), encoding='utf-8')
     (folder / 'summary.json').write_text(json.dumps(summary_of(analysis), indent=1), encoding='utf-8')
     model_path = folder / 'error_model.yaml'
@@ -33,19 +38,11 @@ def write_results(folder, analysis):
         model_path.unlink()
 
 
-def text_of(analysis):
-    """Mean error and standard deviation of both axes as text, one line per axis."""
-    return '\n'.join(
-        'f(%s) = %s, largest variance %.5f m², standard deviation %.4f m'
-        % (name, polynomial_text(axis.poly, name), variances.max_variance_m2, variances.max_sigma_m)
-        for name, axis, variances in (('z', analysis.z, analysis.z), ('x', analysis.x, analysis.x_variance)))
-
-
-def _summary(analysis, _figures):
+def _summary(analysis, _drawn):
     model = analysis.model
     rows = [('measurements (mean error)', _count(analysis.x), _count(analysis.z)),
             ('measurements (variance)', _count(analysis.x_variance), _count(analysis.z)),
-            ('mean error f [m]', polynomial_text(analysis.x.poly, 'x'), polynomial_text(analysis.z.poly, 'z')),
+            ('mean error f [m]', analysis.x.poly_text('x'), analysis.z.poly_text('z')),
             ('largest variance σ² [m²]', '%.5f' % analysis.x_variance.max_variance_m2,
              '%.5f' % analysis.z.max_variance_m2),
             ('largest standard deviation σ [m]', '%.4f' % analysis.x_variance.max_sigma_m,
@@ -77,7 +74,7 @@ def _bias_text(analysis):
                 '' if analysis.model is None else ' The error model corrects the mean error.'))
 
 
-def _setup(analysis, figures):
+def _setup(analysis, drawn):
     inputs = analysis.inputs
     camera, complete = inputs.z.camera, inputs.z.complete()
     positions = len(set(map(tuple, complete.truth_m.tolist())))
@@ -95,21 +92,24 @@ def _setup(analysis, figures):
                      np.degrees(2 * np.arctan(size / (2 * focal))) for focal, size in zip(camera[2:4], camera[:2]))),
                  ('distortion', '%s: %s' % (camera.distortion_model, ', '.join(
                      '%g' % value for value in camera.distortion)) if camera.distortion else 'none')]
-    return [heading('Measurements and camera'), table('measurements and camera', ('', 'value'), rows),
-            paragraph('A cluster is the set of all measurements with one true value of X, or of Z. Clusters of fewer '
-                      'than %d measurements are left out of the statistics of that axis.' % LEAST_IN_CLUSTER),
-            figures.get('layout.png', '')]  # not of tables of one axis
+    pieces = [heading('Measurements and camera'), table('measurements and camera', ('', 'value'), rows),
+              paragraph('A cluster is the set of all measurements with one true value of X, or of Z. Clusters of fewer '
+                        'than %d measurements are left out of the statistics of that axis.' % LEAST_IN_CLUSTER)]
+    if len(complete.truth_m):  # not tables of one axis
+        pieces.append(drawn('layout.png', 'true positions (number of measurements) and estimates, from above', layout,
+                            complete))
+    return pieces
 
 
-def _left_out(analysis, _figures):
+def _left_out(analysis, _drawn):
     inputs = analysis.inputs
     reasons = {}
     for name, reason in inputs.z.left_out:
         reasons.setdefault(reason, []).append(name)
     rows = [(str(len(names)), reason, ', '.join(names)) for reason, names in sorted(reasons.items())]
-    rows += [(str(len(cluster.error_m)), 'fewer than %d with %s = %.2f m' % (LEAST_IN_CLUSTER, axis, cluster.truth_m),
-              'statistics of %s only' % axis) for axis, errors in (('Z', inputs.z), ('X', inputs.x_variance))
-             for cluster in small_clusters(errors, axis)]
+    rows += [(str(cluster.count), 'fewer than %d with %s = %.2f m' % (LEAST_IN_CLUSTER, axis, cluster.truth_m),
+              'statistics of %s only' % axis) for axis, found in (('Z', analysis.z), ('X', analysis.x_variance))
+             for cluster in found.small]
     pieces = [heading('Measurements that were left out')]
     pieces.append(table('rejected and unusable measurements', ('number', 'reason', 'measurements'), rows) if rows
                   else paragraph('No measurement was rejected, and none was unusable.'))
@@ -123,50 +123,51 @@ def _left_out(analysis, _figures):
              '–' if outlier.intended_m is None else position_text(outlier.intended_m)) for outlier in inputs.outliers])]
 
 
-def _z(analysis, figures):
+def _z(analysis, drawn):
     return [heading('Errors in Z, the distance ahead'),
             paragraph('f(z) = %s metres, fitted to the mean errors of the clusters with equal weights.'
-                      % polynomial_text(analysis.z.poly, 'z')),
-            figures['z_error.png'], _cluster_table(analysis.z, 'Z', 'errors in Z by true Z'),
-            figures['z_variance.png']]
+                      % analysis.z.poly_text('z')),
+            drawn('z_error.png', 'error in Z by true Z, and f(z)', error_by_truth, analysis.z, 'Z'),
+            _cluster_table(analysis.z, 'Z', 'errors in Z by true Z'),
+            drawn('z_variance.png', 'variance of the error in Z by true Z', variances, analysis.z, 'Z')]
 
 
-def _x(analysis, figures):
+def _x(analysis, drawn):
     pieces = [heading('Errors in X, to the side'),
-              paragraph('f(x) = %s metres.' % polynomial_text(analysis.x.poly, 'x')),
-              figures['x_error.png'], _cluster_table(analysis.x, 'X', 'errors in X by true X')]
-    if analysis.x_variance != analysis.x:
+              paragraph('f(x) = %s metres.' % analysis.x.poly_text('x')),
+              drawn('x_error.png', 'error in X by true X, and f(x)', error_by_truth, analysis.x, 'X'),
+              _cluster_table(analysis.x, 'X', 'errors in X by true X')]
+    if analysis.x_variance.poly != analysis.x.poly:
         pieces += [paragraph('The mean error is that of all measurements. Variance and distribution are those of the '
                              '%s measurements of people who are not truncated by the image border.'
                              % _count(analysis.x_variance)),
                    _cluster_table(analysis.x_variance, 'X', 'errors in X of people who are not truncated')]
-    return pieces + [figures['x_variance.png']]
+    return pieces + [drawn('x_variance.png', 'variance of the error in X by true X', variances, analysis.x_variance,
+                           'X')]
 
 
-def _distributions(analysis, figures):
-    tested = [cluster for _name, cluster in analysis.variance_clusters if cluster.tested]
+def _distributions(analysis, drawn):
+    z_clusters, x_clusters = analysis.z.clusters, analysis.x_variance.clusters
+    tests = [cluster.shapiro_p for cluster in z_clusters + x_clusters if cluster.shapiro_p is not None]
     return [
         heading('Distribution of the errors'),
         paragraph('The Shapiro–Wilk test accepts a Gaussian for %d of %d tested clusters. It rejects a Gaussian if p '
                   '(in the tables of the clusters) is below 0.05. Small clusters are seldom rejected, which does not '
                   'prove that they are Gaussian. Clusters with fewer than %d measurements, or with equal errors, are '
-                  'not tested.' % (sum(cluster.looks_gaussian for cluster in tested), len(tested), LEAST_TO_TEST)),
-        figures['z_distribution.png'], figures['x_distribution.png']]
+                  'not tested.' % (sum(p >= SIGNIFICANCE for p in tests), len(tests), LEAST_TO_TEST)),
+        drawn('z_distribution.png', 'density of the error in Z, and the fitted Gaussian', histograms, z_clusters, 'Z'),
+        drawn('x_distribution.png', 'density of the error in X, and the fitted Gaussian', histograms, x_clusters, 'X')]
 
 
-def _model(analysis, figures):
-    if analysis.model is None:
-        pieces = [paragraph('%s%s.' % (analysis.model_note[:1].upper(), analysis.model_note[1:]))]
-    else:
-        pieces = _model_pieces(analysis.model, figures)
-    return [heading('Error model and its validation')] + pieces
-
-
-def _model_pieces(model, figures):
+def _model(analysis, drawn):
+    model, title = analysis.model, heading('Error model and its validation')
+    if model is None:
+        return [title, paragraph('%s%s.' % (analysis.model_note[:1].upper(), analysis.model_note[1:]))]
     scores, limits = model.cross_validated, model.measured_range
     z_bias = ' '.join('%+.4f%s' % (value, {0: '', 1: ' z', 2: ' z²', 3: ' z³'}[len(model.z_bias) - 1 - number])
                       for number, value in enumerate(model.z_bias))
     return [
+        title,
         paragraph('error_model.yaml, in the folder of this report, is for bbox3d_node (error_model:=FILE), which '
                   'removes the bias and sets the covariance of positions. It is fitted to the %d measurements with '
                   'X and Z, at %d positions with equal weights. Its number of coefficients was selected by '
@@ -177,7 +178,8 @@ def _model_pieces(model, figures):
             ('measured range', 'Z from %.2f to %.2f m, |X| to %.2f m'
              % (limits.z_min_m, limits.z_max_m, limits.x_max_m)),
             ('outside of it', 'bias as at its limit; σ grows by %.1f m per metre' % model.growth_outside))),
-        figures['sigma.png'],
+        drawn('sigma.png', 'standard deviation of the error model by range, and remaining errors of the positions',
+              sigmas, analysis),
         paragraph('Leave-one-position-out cross-validation: the measurements of each position are corrected by a model '
                   'of all other positions. The coverage is the share of them inside the ellipse of that model; ideally '
                   'it is that of the ellipse. σ is widened until the 95 %% ellipse contains 95 %%, because errors have '
@@ -191,7 +193,7 @@ def _cluster_table(axis, name, caption):
     return table(caption, header, [
         ('%.2f' % cluster.truth_m, '%d' % cluster.count, '%+.4f' % cluster.mean_m, '%.4f' % cluster.sigma_m,
          '%.6f' % cluster.variance_m2, '%.4f' % cluster.rms_m,
-         '%.4f' % cluster.shapiro_p if cluster.tested else 'not tested') for cluster in axis.clusters])
+         'not tested' if cluster.shapiro_p is None else '%.4f' % cluster.shapiro_p) for cluster in axis.clusters])
 
 
 def _spread_text(spread):

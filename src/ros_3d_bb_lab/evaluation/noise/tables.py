@@ -9,16 +9,16 @@ import datetime
 from typing import Any, NamedTuple, Tuple
 
 import numpy as np
+from scipy import stats
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.box3d import plausible, truncated_edges
-from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
+from ros_3d_bb.estimation.box3d_estimator import estimator_named
 from ros_3d_bb.estimation.error_model import RECORDED
-from ros_3d_bb.sessions.plausibility import likely_errors, outlier_of
+from ros_3d_bb.sessions.plausibility import outliers_of
 from ros_3d_bb.sessions.session_reader import SessionError, annotated_people, read_depth, read_session
 
 AXES = ('X', 'Z')
-LEAST_IN_CLUSTER = 3
+LEAST_TO_TEST = 8  # measurements, for the normality test
 LEAST_EXTENT_M = 0.05  # tables of less are in metres
 ROUNDING_MM = 1.01  # errors may have been computed before the values were rounded
 
@@ -42,7 +42,7 @@ class MeasurementTable(NamedTuple):
 
     def complete(self):
         """Select the measurements with x and z."""
-        return self._part(self._is_complete())
+        return self._part(np.isfinite(np.c_[self.measured_m[:, [0, 2]], self.truth_m]).all(axis=1))
 
     def whole(self):
         """Select the measurements of people that are not truncated."""
@@ -51,20 +51,13 @@ class MeasurementTable(NamedTuple):
     def outliers(self):
         """Outliers of the table, see `plausibility`. Measurements of one axis are not checked."""
         complete = self.complete()
-        measured_m = complete.measured_m[:, [0, 2]]
-        likely = likely_errors(measured_m, complete.truth_m)
-        found = [outlier_of(name, likely, *positions_m)
-                 for name, *positions_m in zip(complete.ids, measured_m, complete.truth_m)]
-        return tuple(outlier for outlier in found if outlier is not None)
+        return tuple(filter(None, outliers_of(complete.ids, complete.measured_m[:, [0, 2]], complete.truth_m)))
 
     def without(self, outliers):
         """Select the measurements that are not among the outliers. Others of the same image remain."""
         found = set((outlier.name, *outlier.truth_m.tolist()) for outlier in outliers)
         return self._part(np.array([(name, *truth_m) not in found
                                     for name, truth_m in zip(self.ids, self.truth_m.tolist())]))
-
-    def _is_complete(self):
-        return np.isfinite(np.concatenate((self.measured_m[:, [0, 2]], self.truth_m), axis=1)).all(axis=1)
 
     def _part(self, mask):
         return self._replace(measured_m=self.measured_m[mask], truth_m=self.truth_m[mask], cut=self.cut[mask],
@@ -77,27 +70,37 @@ class Cluster(NamedTuple):
     truth_m: float
     error_m: np.ndarray
 
+    @property
+    def count(self):
+        return len(self.error_m)
 
-def clusters_of(measurements, axis, least=2):
-    """Group the errors of an axis, 'X' or 'Z', by true value. Clusters with fewer than 3 measurements are left out.
+    @property
+    def mean_m(self):
+        return float(self.error_m.mean())
 
-    Raises ValueError if fewer than `least` clusters remain.
-    """
-    clusters = [cluster for cluster in _groups_of(measurements, axis) if len(cluster.error_m) >= LEAST_IN_CLUSTER]
-    if len(clusters) < least:
-        raise ValueError('%s: at least %d measurements at each of %d values of %s true needed; there are %s' % (
-            measurements.name, LEAST_IN_CLUSTER, least, axis, ', '.join(
-                '%d at %g m' % (len(group.error_m), group.truth_m)
-                for group in _groups_of(measurements, axis)) or 'none'))
-    return clusters
+    @property
+    def variance_m2(self):
+        """Variance, divided by n, as in the thesis."""
+        return float(self.error_m.var())
+
+    @property
+    def sigma_m(self):
+        return float(np.sqrt(self.variance_m2))
+
+    @property
+    def rms_m(self):
+        return float(np.sqrt((self.error_m ** 2).mean()))
+
+    @property
+    def shapiro_p(self):
+        """Result of the Shapiro-Wilk test; None if all errors are equal, or there are fewer than LEAST_TO_TEST."""
+        if self.count < LEAST_TO_TEST or np.ptp(self.error_m) == 0:
+            return None
+        return float(stats.shapiro(self.error_m)[1])
 
 
-def small_clusters(measurements, axis):
-    """Clusters of an axis that `clusters_of` leaves out."""
-    return [cluster for cluster in _groups_of(measurements, axis) if len(cluster.error_m) < LEAST_IN_CLUSTER]
-
-
-def _groups_of(measurements, axis):
+def clusters_of(measurements, axis):
+    """Group the errors of an axis, 'X' or 'Z', by true value. Returns Clusters."""
     number = AXES.index(axis)
     truth_m, measured_m = measurements.truth_m[:, number], measurements.measured_m[:, 2 * number]
     known = np.isfinite(truth_m) & np.isfinite(measured_m)
@@ -154,8 +157,8 @@ def read_session_measurements(folder, estimator):
     if not used:
         raise ValueError('%s: no frame with ground truth and an estimate (%s)' % (folder, estimator))
     positions_m, frames = zip(*used)
-    return MeasurementTable(str(folder), np.array(positions_m), np.array([frame.truth_m for frame in frames]),
-                            np.array([_is_cut(frame, session.camera) for frame in frames]),
+    return MeasurementTable(str(folder), np.array(positions_m), np.array([frame.truth_m[::2] for frame in frames]),
+                            np.array([any(frame.truncated_edges(session.camera)[::2]) for frame in frames]),
                             tuple(frame.name for frame in frames), tuple(left_out), session.camera, _dates_of(frames))
 
 
@@ -166,19 +169,11 @@ def _dates_of(frames):
 
 
 def _estimate(frame, session, name):
-    """Position (3,) of the annotated person of a frame, whose box is the first one, or None."""
+    """Position (3,) of the annotated person of a frame, or None."""
     if name == RECORDED:
         return frame.estimate_m
-    boxes = estimate_boxes(read_depth(frame, session), frame.boxes_px, session.camera, estimator_named(name),
-                           frame.level_from_camera)
-    return boxes[0].center_m if boxes and plausible(boxes[0]) else None
-
-
-def _is_cut(frame, camera):
-    if not frame.boxes_px:
-        return False
-    left, _top, right, _bottom = truncated_edges(frame.boxes_px[0], (0, 0) + camera[:2])
-    return left or right
+    box = frame.estimate(read_depth(frame, session), session.camera, estimator_named(name))
+    return None if box is None else box.center_m
 
 
 def _axis_of(row, axis, where):
