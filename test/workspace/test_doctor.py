@@ -19,6 +19,7 @@ from ros_3d_bb.diagnosis.checks import ROLES
 from ros_3d_bb.diagnosis.message_observer import Observation
 from ros_3d_bb.nodes.common.graph_observer import GraphObserver
 from ros_3d_bb.nodes.doctor import bag_findings, machine_findings
+from ros_3d_bb.pipeline.transform_buffer import TransformBuffer
 from support.bags import changed_bag, scene_bag
 from support.masterless import masterless
 from support.ros import header_at
@@ -242,6 +243,18 @@ def test_the_rate_is_that_of_a_bag_that_is_looped():
     for ros_ns in [0] + [NS + number % 10 * NS // 10 for number in range(30)]:
         seen.take(DiagnosticArray(), ros_ns)
     assert seen.stream('').rate_hz == pytest.approx(10, rel=0.15)
+
+
+@pytest.mark.parametrize('since_jump', [1, 8])
+def test_the_pose_is_that_after_the_bag_has_looped(since_jump):
+    """tf forgets earlier transforms when the bag restarts."""
+    seen, transforms = Observation(ROLES['depth'], DEPTH), TransformBuffer()
+    for second in list(range(90, 100)) + list(range(1, 1 + since_jump)):
+        seen.take(Image(header=header_at(second * NS, 'camera')), second * NS)
+    for second in (1, 10):
+        link, = transform_messages(rospy.Time(second), [('map', 'camera', np.eye(4))])
+        transforms.set_transform(link, '')
+    assert seen.tf_seen(transforms, 'map').fault == ''
 
 
 def test_robot10_is_not_robot1():
