@@ -113,9 +113,12 @@ def test_recorded_outputs_do_not_mix_with_the_current_ones(cameras, prefixes):
     _parameters, nodes = loaded('playback.launch', 'bag:=/b.bag', 'detector:=depth', 'cameras:=' + cameras)
     remapped = dict(nodes['player'].remap_args + [each.split(':=') for each in nodes['player'].args.split()
                                                   if ':=' in each])
-    outputs = [prefix + topic for prefix in prefixes for topic in ('yolo_bounding_box', 'ros_3d_bb/bb_3d')]
-    outputs += ['ros_3d_bb/tracks', 'visualization_marker_array']
-    assert remapped == {topic: 'recorded/' + topic for topic in outputs}
+    topics = ['yolo_bounding_box', 'yolo_result_out', 'ros_3d_bb/bb_3d']
+    topics += ['ros_3d_bb/' + image for image in ('color', 'raw', 'depth')]
+    outputs = [prefix + topic for prefix in prefixes for topic in topics]
+    outputs += ['ros_3d_bb/tracks', 'visualization_marker_array', '/diagnostics']
+    expected = {topic: 'recorded/' + topic.lstrip('/') for topic in outputs}
+    assert remapped == dict(expected, clock='/clock')  # which rosbag publishes in its namespace
 
 
 def test_commands_of_the_container_start_camera_and_pipeline():
