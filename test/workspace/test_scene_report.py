@@ -1,6 +1,7 @@
 import csv
 import os
 import re
+import resource
 import subprocess
 
 import numpy as np
@@ -85,6 +86,17 @@ def test_tracks_are_written_as_a_table(bag, tmp_path):
     with rosbag.Bag(bag) as opened:
         people, _tracks = paths_of(read_recording(opened))
     np.testing.assert_allclose([float(row['y_m']) - SHIFT_M for row in rows], np.array(people[1])[1:, 1])
+
+
+def test_a_table_that_cannot_be_written_leaves_no_part_of_it(bag, tmp_path):
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (200, before[1]))
+    try:
+        with pytest.raises(OSError):
+            write_csv(bag, str(tmp_path / 'tracks.csv'))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert os.listdir(str(tmp_path)) == []
 
 
 def write_unindexed(path):

@@ -3,6 +3,7 @@ the table compares the tracks with truth.
 """
 import argparse
 import csv
+import io
 import os
 import pathlib
 import sys
@@ -16,6 +17,7 @@ from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, absolute, topic_of
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg, stamp_of,
                                                    tracks_from_msg, transform_from_msg)
+from ros_3d_bb.core.atomic_file import atomic_write
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb.visualization.image_overlay import draw_boxes, draw_caption
@@ -98,15 +100,17 @@ def table_of_tracks(moments):
 
 def write_csv(bag_path, csv_path):
     """Write each track of each image in a bag as a row of CSV_COLUMNS; covariances are empty if unknown."""
-    with rosbag.Bag(bag_path) as bag, open(csv_path, 'w', newline='') as stream:
-        rows = csv.writer(stream)
-        rows.writerow(CSV_COLUMNS)
+    text = io.StringIO()
+    rows = csv.writer(text)
+    rows.writerow(CSV_COLUMNS)
+    with rosbag.Bag(bag_path) as bag:
         for _topic, message in messages_on(bag, ['/' + TRACKS_TOPIC]):
             stamp = '%d.%09d' % (message.header.stamp.secs, message.header.stamp.nsecs)
             for track in tracks_from_msg(message):
                 covariance = [''] * 3 if track.covariance is None else track.covariance[[0, 0, 1], [0, 1, 1]]
                 rows.writerow([stamp, track.id, track.label, track.status, *track.position_m[:2],
                                *track.velocity_mps[:2], *covariance])
+    atomic_write(csv_path, text.getvalue().encode())
 
 
 def topics_of_cameras(bag, topic):
