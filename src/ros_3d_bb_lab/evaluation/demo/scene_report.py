@@ -122,7 +122,7 @@ def topics_of_cameras(bag, topic):
 
 
 def topics_of_robot(bag):
-    """Names of ground truth and tracks in an open bag, in the namespace of the tracks if only one has some."""
+    """Names of ground truth and tracks in an open bag, in the namespace of the tracks if there is only one."""
     names = topics_of_cameras(bag, TRACKS_TOPIC)
     namespace = names[0][:-len('/' + TRACKS_TOPIC)] if len(names) == 1 else ''
     return ['%s/%s' % (namespace, topic) for topic in (TRUTH_TOPIC, TRACKS_TOPIC)]
