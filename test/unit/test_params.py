@@ -42,5 +42,6 @@ def test_values_of_another_type_are_rejected(given):
 
 
 def test_unknown_keys_name_the_nearest_known_one():
-    with pytest.raises(ValueError, match='unknown parameter ~strid; did you mean ~stride'):
+    with pytest.raises(ValueError, match='unknown parameter ~strid; did you mean ~stride') as error:
         params_from({'strid': 5}, Camera, Filter)
+    assert str(error.value).endswith('Known: classes, enabled, frame, rate, stride')  # both have rate

@@ -277,6 +277,11 @@ def test_launch_arguments_publish_the_pose_of_a_camera_alone(degrees):
     ('playback.launch', ['bag:=/b.bag', 'camera_pose:=floor', 'camera_height:=1.2'], ['camera_pose', 'camera_height']),
     ('pipeline.launch', ['cameras:=front,rear', 'camera_pose:=floor'], ['cameras', 'camera_pose']),
     ('measure.launch', ['session:=/s', 'camera_root:=camera_link'], ['camera_height', 'camera_root']),
+    ('pipeline.launch', ['camera_height:=1,2'], ['camera_height', '1,2', 'metres']),
+    ('playback.launch', ['bag:=/b.bag', 'camera_height:=120'], ['camera_height', '120', 'metres']),
+    ('measure.launch', ['session:=/s', 'camera_height:=1', 'camera_tilt:=20'], ['camera_tilt', '20', 'radians']),
+    ('jackal.launch', ['driver:=none', 'mount:=0.1 0 0,4 0 0 0'], ['mount', '0,4', 'six numbers']),
+    ('jackal.launch', ['driver:=none', 'mount:=0.1 0 0.4'], ['mount', '0.1 0 0.4', 'six numbers']),
     ('pipeline.launch', ['cameras:=front,rear', 'detector:=yolo5'], ['detector', 'yolo5']),
     ('jackal.launch', ['driver:=realsense'], ['driver', 'realsense2_camera', 'pyrealsense2']),
     ('realsense.launch', ['file:=/a.bag', 'driver:=realsense2_camera'], ['file', 'driver', 'pyrealsense2'])])

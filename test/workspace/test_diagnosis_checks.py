@@ -64,6 +64,12 @@ def without_tf(*missing, **changed):
     return sound(tf=TfSeen('map', 'optical', 1000.0, links, 'the error of tf2'))
 
 
+def test_no_frame_of_the_robot_is_proposed_for_the_images():
+    """The fix was frame_id:=camera_link, whose x axis points ahead."""
+    fault, = [finding for finding in findings(without_tf('optical')) if finding.fault]
+    assert 'static_transform_publisher' in fault.fix and 'frame_id' not in fault.fix
+
+
 def moved(stamps_ns, by_s):
     return tuple(stamp_ns + int(by_s * NS) for stamp_ns in stamps_ns)
 
@@ -102,7 +108,8 @@ CASES = [
     (without_tf('odom'), 'transforms', 'tf has no frame map', 'frame_world:=odom'),
     (without_tf('camera_link'), 'transforms', 'tf has two trees',
      'static_transform_publisher X Y Z YAW PITCH ROLL base_link camera_link'),
-    (without_tf('optical'), 'transforms', 'tf has no frame optical', 'frame_id:='),
+    (without_tf('optical', rgb_optical_frame=Link('camera_link', 0, 0)), 'transforms', 'tf has no frame optical',
+     'frame_id:=rgb_optical_frame'),
     (without_tf(base_link=Link('odom', 980, 995)), 'transforms',
      'the transform from base_link to odom ends 5.000 s before', 'publisher of base_link'),
     (without_tf(odom=Link('map', 1003, 1010)), 'transforms', 'the transform from odom to map begins 3.000 s after',

@@ -17,8 +17,10 @@ from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.diagnosis.checks import ROLES
 from ros_3d_bb.diagnosis.message_observer import Observation
+from ros_3d_bb.diagnosis.observations import Observations, Stream
 from ros_3d_bb.nodes.common.graph_observer import GraphObserver
-from ros_3d_bb.nodes.doctor import bag_findings, machine_findings
+from ros_3d_bb.nodes.doctor import bag_findings, graph_findings, machine_findings
+from ros_3d_bb.pipeline.transform_buffer import TransformBuffer
 from support.bags import changed_bag, scene_bag
 from support.masterless import masterless
 from support.ros import header_at
@@ -244,6 +246,18 @@ def test_the_rate_is_that_of_a_bag_that_is_looped():
     assert seen.stream('').rate_hz == pytest.approx(10, rel=0.15)
 
 
+@pytest.mark.parametrize('since_jump', [1, 8])
+def test_the_pose_is_that_after_the_bag_has_looped(since_jump):
+    """tf forgets earlier transforms when the bag restarts."""
+    seen, transforms = Observation(ROLES['depth'], DEPTH), TransformBuffer()
+    for second in list(range(90, 100)) + list(range(1, 1 + since_jump)):
+        seen.take(Image(header=header_at(second * NS, 'camera')), second * NS)
+    for second in (1, 10):
+        link, = transform_messages(rospy.Time(second), [('map', 'camera', np.eye(4))])
+        transforms.set_transform(link, '')
+    assert seen.tf_seen(transforms, 'map').fault == ''
+
+
 def test_robot10_is_not_robot1():
     """The inputs of nodes in another namespace, in their diagnostics, are not those of this robot."""
     message = DiagnosticArray(status=[
@@ -256,6 +270,21 @@ def test_robot10_is_not_robot1():
         sleep.side_effect = lambda _s: connections.subscribers['/diagnostics'].callback(message)
         seen = GraphObserver(camera='').observations()
     assert set(seen.nodes) == {'robot1/bbox3d_node'} and seen.streams['depth'].topic == '/robot1' + DEPTH
+
+
+@pytest.mark.parametrize('nodes, named', [
+    (['robot2/tracker_node', 'robot1/tracker_node'], 'ROS_NAMESPACE=robot1 rosrun ros_3d_bb doctor'),
+    (['robot1/tracker_node', 'tracker_node'], ''), (['front/bbox3d_node', 'tracker_node'], ''), ([], '')])
+def test_a_pipeline_in_another_namespace_is_reported(monkeypatch, nodes, named):
+    """The doctor then finds topics of one of them, and misses others."""
+    observer = mock.Mock()
+    observer.return_value.observations.return_value = Observations(
+        {key: Stream(role, '/' + role.name) for key, role in ROLES.items()}, {}, 5.0,
+        nodes={name: (0, 'working') for name in nodes})
+    monkeypatch.setattr('ros_3d_bb.nodes.doctor.GraphObserver', observer)
+    with masterless():
+        found = graph_findings(argparse.Namespace(camera='', target_frame='', seconds=0.0, patience=0.0))
+    assert [each.fix for each in found if each.subject == 'namespace'] == ([named] if named else [])
 
 
 def observed_with(params, *messages):

@@ -3,9 +3,12 @@
 test_package.py loads each launch file, test_camera_mount.py those with the pose of a camera. test/nodes/navigation.test
 runs navigation.launch with the planners.
 """
+import ast
+import glob
 import os
 import re
 import shlex
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -113,9 +116,22 @@ def test_recorded_outputs_do_not_mix_with_the_current_ones(cameras, prefixes):
     _parameters, nodes = loaded('playback.launch', 'bag:=/b.bag', 'detector:=depth', 'cameras:=' + cameras)
     remapped = dict(nodes['player'].remap_args + [each.split(':=') for each in nodes['player'].args.split()
                                                   if ':=' in each])
-    outputs = [prefix + topic for prefix in prefixes for topic in ('yolo_bounding_box', 'ros_3d_bb/bb_3d')]
-    outputs += ['ros_3d_bb/tracks', 'visualization_marker_array']
-    assert remapped == {topic: 'recorded/' + topic for topic in outputs}
+    topics = ['yolo_bounding_box', 'yolo_result_out', 'ros_3d_bb/bb_3d']
+    topics += ['ros_3d_bb/' + image for image in ('color', 'raw', 'depth')]
+    outputs = [prefix + topic for prefix in prefixes for topic in topics]
+    outputs += ['ros_3d_bb/tracks', 'visualization_marker_array', '/diagnostics']
+    expected = {topic: 'recorded/' + topic.lstrip('/') for topic in outputs}
+    assert remapped == dict(expected, clock='/clock')  # which rosbag publishes in its namespace
+
+
+def test_expressions_assign_no_name_which_roslaunch_of_melodic_rejects():
+    """In Python 2, a list comprehension assigns in the scope of the expression; a generator does not."""
+    for path in glob.glob(os.path.join(ROOT, 'launch', '*.launch')):
+        values = [value for tag in ElementTree.parse(path).iter() for value in tag.attrib.values()]
+        for value in values:
+            if value.startswith('$(eval '):
+                nodes = ast.walk(ast.parse(value[len('$(eval '):-1], mode='eval'))
+                assert not any(isinstance(node, ast.ListComp) for node in nodes), (path, value)
 
 
 def test_commands_of_the_container_start_camera_and_pipeline():

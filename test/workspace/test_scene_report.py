@@ -1,6 +1,7 @@
 import csv
 import os
 import re
+import resource
 import subprocess
 
 import numpy as np
@@ -85,6 +86,29 @@ def test_tracks_are_written_as_a_table(bag, tmp_path):
     with rosbag.Bag(bag) as opened:
         people, _tracks = paths_of(read_recording(opened))
     np.testing.assert_allclose([float(row['y_m']) - SHIFT_M for row in rows], np.array(people[1])[1:, 1])
+
+
+def test_a_bag_that_was_recorded_in_a_namespace_has_a_report(bag, tmp_path):
+    """As with ROS_NAMESPACE=robot1. Transforms are common to all robots."""
+    path = str(tmp_path / 'in.bag')
+    changed_bag(bag, path, lambda topic, *rest: (topic if topic == '/tf' else '/robot1' + topic,) + rest)
+    with rosbag.Bag(bag) as opened, rosbag.Bag(path) as changed:
+        expected, found = read_recording(opened), read_recording(changed)
+    assert found.has_truth and [len(each.tracks) for each in found.moments] == [
+        len(each.tracks) for each in expected.moments]
+    write_csv(path, str(tmp_path / 'tracks.csv'))
+    assert (tmp_path / 'tracks.csv').read_text().count('person') == 9
+
+
+def test_a_table_that_cannot_be_written_leaves_no_part_of_it(bag, tmp_path):
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (200, before[1]))
+    try:
+        with pytest.raises(OSError):
+            write_csv(bag, str(tmp_path / 'tracks.csv'))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert os.listdir(str(tmp_path)) == []
 
 
 def write_unindexed(path):

@@ -113,3 +113,15 @@ def test_one_late_transform_does_not_replace_the_latest_pose():
         assert transforms.lookup('map', 'base_link', rospy.Time(100))[0, 3] == 0
         transforms.latest('map', 'base_link')
         assert transforms.lookup('map', 'base_link', rospy.Time(100))[0, 3] == 0
+
+
+@pytest.mark.parametrize('back_s, is_kept', [(0.02, True), (0.9, True), (3.0, False)])
+def test_transforms_are_kept_when_time_goes_back_by_less_than_a_jump(back_s, is_kept):
+    """As with each message of a second publisher of /clock, such as a bag that was recorded with all topics."""
+    with masterless() as connections:
+        transforms = Transforms(wait_s=0.0)
+        connections.now = STAMP
+        connections.send('/tf', TFMessage([link('map', 'front')]))
+        connections.now = STAMP - rospy.Duration(back_s)
+        connections.send('/tf', TFMessage([link('map', 'rear')]))
+        assert bool(transforms.buffer.can_transform_core('map', 'front', STAMP)[0]) is is_kept

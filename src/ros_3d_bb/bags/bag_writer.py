@@ -38,8 +38,14 @@ def new_bag(path, compression):
     """Open a rosbag.Bag for writing. It has a temporary name until the block ends without an error."""
     partial = path + PARTIAL
     try:
-        with rosbag.Bag(partial, 'w', compression=compression) as bag:
+        bag = rosbag.Bag(partial, 'w', compression=compression)
+        try:
             yield bag
+        except BaseException:
+            with contextlib.suppress(Exception):  # after a failed write, as on a full disk
+                bag.close()
+            raise
+        bag.close()
         os.replace(partial, path)
     finally:
         with contextlib.suppress(FileNotFoundError):

@@ -88,7 +88,7 @@ def params_from(given, *kinds):
     for name in sorted(given):
         if name not in known:
             raise ValueError('unknown parameter ~%s; did you mean ~%s? Known: %s'
-                             % (name, nearest_name(name, known), ', '.join(sorted(known))))
+                             % (name, nearest_name(name, known), ', '.join(sorted(set(known)))))
     filled = [kind(**{name: _converted(name, given[name], kind.__annotations__[name])
                       for name in kind._fields if name in given}) for kind in kinds]
     for params in filled:

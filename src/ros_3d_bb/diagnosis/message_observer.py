@@ -15,7 +15,7 @@ from ros_3d_bb.conversions.camera_msgs import (DEPTH_TOPICS, IMAGE_KINDS, RAW, S
                                                uncompressed)
 from ros_3d_bb.conversions.image_msgs import DEPTH_SCALES, imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, camera_from_msg, time_from
-from ros_3d_bb.core.time_sync import NS, SAME_NS
+from ros_3d_bb.core.time_sync import JUMP_NS, NS, SAME_NS
 from ros_3d_bb.diagnosis.camera_mount import camera_mount
 from ros_3d_bb.diagnosis.checks import COLOR, DEPTH, INFO, ROLES
 from ros_3d_bb.diagnosis.observations import COMPRESSED_IMAGE, IMAGE, KEPT, Newest, Observations, Stream, TfSeen
@@ -94,7 +94,10 @@ class Observation(object):
         """
         if not self._stamps_ns:
             return None
-        stamp_ns = self._stamps_ns[len(self._stamps_ns) // 2]  # the middle one: its transforms must have arrived
+        stamps_ns = list(self._stamps_ns)
+        begin = max((end for end in range(1, len(stamps_ns)) if stamps_ns[end] < stamps_ns[end - 1] - JUMP_NS),
+                    default=0)  # tf has no transforms from before a jump back in time
+        stamp_ns = stamps_ns[(begin + len(stamps_ns)) // 2]  # the middle one: its transforms must have arrived
         target, source = target_frame.lstrip('/'), (source_frame or self.newest.header.frame_id).lstrip('/')
         stamp, fault = time_from(stamp_ns), ''
         try:

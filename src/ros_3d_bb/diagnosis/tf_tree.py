@@ -49,9 +49,11 @@ def why_missing(links, target, source, stamp_s):
                 % pose_fix(source))
     if source not in frames:
         more = ' and %d more' % (len(frames) - NAMED) if len(frames) > NAMED else ''
-        return ('tf has no frame %s; its frames: %s%s' % (source, ', '.join(frames[:NAMED]), more),
-                'publish the pose of the camera: %s; or, if it has another name in tf, such as %s: frame_id:=%s'
-                % ((_publisher_command('base_link', source),) + 2 * (nearest_name(source, frames),)))
+        fix = 'publish the pose of the camera: ' + _publisher_command('base_link', source)
+        optical = [frame for frame in frames if is_optical(frame)]
+        if optical:
+            fix += '; or, if it has another name in tf: frame_id:=' + nearest_name(source, optical)
+        return 'tf has no frame %s; its frames: %s%s' % (source, ', '.join(frames[:NAMED]), more), fix
     parents = {frame: link.parent for frame, link in links.items()}
     up, down = path_to_root(parents, source), path_to_root(parents, target)
     if target not in frames and is_optical(up[-1]):

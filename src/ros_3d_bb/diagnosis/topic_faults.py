@@ -74,7 +74,8 @@ def clock_fault(stream, use_sim_time):
         return (fault + 'the clock of this machine',
                 'play bags with rosbag play --clock, and rosparam set use_sim_time true before the nodes start')
     return (fault + 'the clock of this machine',
-            'synchronise the clocks of all machines (chrony); or the preceding nodes take that long')
+            'synchronise the clocks of all machines (chrony)'
+            + ('; or the preceding nodes take that long' if lag_s > 0 else ''))
 
 
 def span(seconds):

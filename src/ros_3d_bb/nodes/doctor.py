@@ -78,13 +78,24 @@ def graph_findings(arguments):
         observer = GraphObserver(arguments.target_frame, camera)
         if shutdown.wait(arguments.seconds):
             raise KeyboardInterrupt
-        found = findings(observer.observations())
+        seen = observer.observations()
+        found = _namespace_findings(seen.nodes) + findings(seen)
         observer.close()
         if len(cameras) > 1:
             found.insert(0, Finding('cameras', '%s; of %s, checked one at a time: doctor --camera NAME'
                                     % (camera, ', '.join(cameras))))
         if not any(finding.fault for finding in found) or time.monotonic() >= deadline_s:
             return found
+
+
+def _namespace_findings(nodes):
+    """Report a pipeline that runs in other namespaces only; `nodes` are the names in diagnostics."""
+    own = rospy.resolve_name('tracker_node')[1:]
+    others = sorted(name[:-len('/tracker_node')] for name in nodes if name.endswith('/tracker_node'))
+    if own in nodes or not others:
+        return []
+    return [Finding('namespace', '', 'tracker_node runs in %s' % ', '.join(others),
+                    'ROS_NAMESPACE=%s rosrun ros_3d_bb doctor' % others[0])]
 
 
 def machine_findings():

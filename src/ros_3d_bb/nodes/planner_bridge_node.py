@@ -155,9 +155,10 @@ class PlannerBridgeNode(object):
     def _read(self, message):
         """Convert a message to `ReceivedTracks`. Raises ValueError if the tracks must not be passed to planners."""
         stamp_ns, now_ns = stamp_of(message), _now_ns()
-        if abs(now_ns - stamp_ns) > self._params.timeout * NS:
-            raise ValueError('their stamp is %.3f s before the clock, more than ~timeout (%g s); a bag needs '
-                             'use_sim_time' % ((now_ns - stamp_ns) / NS, self._params.timeout))
+        late_s = (now_ns - stamp_ns) / NS
+        if abs(late_s) > self._params.timeout:
+            raise ValueError('their stamp is %.3f s %s the clock, more than ~timeout (%g s); a bag needs use_sim_time'
+                             % (abs(late_s), 'before' if late_s > 0 else 'after', self._params.timeout))
         tracks = received_tracks(message, self._diagnostics)
         return ReceivedTracks(stamp_ns, now_ns, message.header.frame_id, with_class_widths(tracks, self._classes),
                               self._transforms_at(message.header))

@@ -3,7 +3,6 @@ import contextlib
 import time
 
 import rospy
-import tf2_ros
 from diagnostic_msgs.msg import DiagnosticArray
 from genpy.message import get_message_class
 from rosgraph_msgs.msg import Clock
@@ -16,6 +15,7 @@ from ros_3d_bb.diagnosis.checks import BOXES3D, COLOR, DEPTH, ROLES
 from ros_3d_bb.diagnosis.message_observer import EdgeObserver, Observation, observations_of
 from ros_3d_bb.nodes.common.master import published_topics, publishers_of
 from ros_3d_bb.nodes.common.subscribers import IMAGE_BUFFER
+from ros_3d_bb.nodes.common.tf_lookup import TransformListener
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from ros_3d_bb.pipeline.tracking_stage import TrackerNodeParams
 from ros_3d_bb.pipeline.transform_buffer import TransformBuffer
@@ -35,7 +35,7 @@ class GraphObserver(object):
         self._target_frame, self._camera = target_frame, camera
         self._statuses, self._clocks = {}, []
         self._transforms = TransformBuffer()
-        self._listener = tf2_ros.TransformListener(self._transforms)
+        self._listener = TransformListener(self._transforms)
         self._subscribers = [rospy.Subscriber('/diagnostics', DiagnosticArray, self._on_diagnostics),
                              rospy.Subscriber('/clock', Clock, self._clocks.append, queue_size=10)]
         time.sleep(NAMES_S)

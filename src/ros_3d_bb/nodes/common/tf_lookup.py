@@ -1,11 +1,14 @@
 """tf2 lookup at the stamp of an image, with a bounded wait."""
+import functools
 import threading
 import time
 
 import rospy
 import tf2_ros
+from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.conversions.perception_msgs import check_transforms
+from ros_3d_bb.core.time_sync import JUMP_NS
 from ros_3d_bb.diagnosis.tf_tree import links_in, why_missing
 from ros_3d_bb.pipeline.transform_buffer import TransformBuffer
 
@@ -14,28 +17,42 @@ EXPLAINED_S = 2.0  # between two searches of the whole tree for a pair of frames
 REQUESTED_S = 10.0  # time for which the age of a pair of frames is shown after its last lookup
 
 
-class _Listener(tf2_ros.TransformListener):
-    """Receive transforms and notify the threads that wait for them."""
+class TransformListener(object):
+    """Add the transforms of tf to a TransformBuffer, and notify the threads that wait for them.
+
+    As tf2's listener, it clears the buffer when ROS time jumps back, but not if by less than `JUMP_NS`, as with each
+    message of a second publisher of /clock.
+    """
 
     def __init__(self, buffer):
-        self.news = threading.Condition()
-        tf2_ros.TransformListener.__init__(self, buffer, tcp_nodelay=True)
+        self.news, self._buffer, self._latest = threading.Condition(), buffer, rospy.get_rostime()
+        self._subscribers = [
+            rospy.Subscriber(topic, TFMessage, functools.partial(self._add, add), tcp_nodelay=True)
+            for topic, add in (('/tf', buffer.set_transform), ('/tf_static', buffer.set_transform_static))]
 
-    def callback(self, data):
-        self._add(tf2_ros.TransformListener.callback, data)
+    def unregister(self):
+        """Unsubscribe from tf."""
+        for subscriber in self._subscribers:
+            subscriber.unregister()
 
-    def static_callback(self, data):
-        self._add(tf2_ros.TransformListener.static_callback, data)
-
-    def _add(self, add, data):
+    def _add(self, add, message):
         try:
-            check_transforms(data)
+            check_transforms(message)
         except ValueError as error:
             rospy.logwarn_throttle(5.0, 'transforms rejected: %s; waiting for the next' % error)
             return
-        add(self, data)
+        self._clear_after_jump(rospy.get_rostime())
+        for transform in message.transforms:
+            add(transform, message._connection_header.get('callerid', ''))
         with self.news:
             self.news.notify_all()
+
+    def _clear_after_jump(self, now):
+        with self.news:
+            if (self._latest - now).to_nsec() > JUMP_NS:
+                self._buffer.clear()
+                self._latest = now
+            self._latest = max(self._latest, now)
 
 
 class Transforms(object):
@@ -47,7 +64,7 @@ class Transforms(object):
     def __init__(self, wait_s):
         self._wait_s = wait_s
         self.buffer = TransformBuffer()
-        self._listener = _Listener(self.buffer)
+        self._listener = TransformListener(self.buffer)
         self._requested, self._explanations = {}, {}  # by (target, source): time; (sentence, time)
 
     def lookup(self, target_frame, source_frame, stamp):

@@ -3,6 +3,7 @@ the table compares the tracks with truth.
 """
 import argparse
 import csv
+import io
 import os
 import pathlib
 import sys
@@ -16,6 +17,7 @@ from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, absolute, topic_of
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg, stamp_of,
                                                    tracks_from_msg, transform_from_msg)
+from ros_3d_bb.core.atomic_file import atomic_write
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb.visualization.image_overlay import draw_boxes, draw_caption
@@ -54,7 +56,8 @@ def read_recording(bag):
     """Read a Recording from an open bag. Raises ValueError if tracks are missing, or the frames of truth differ."""
     truth, tracks, boxes, links, robot = {}, {}, {}, {}, []
     boxes_topics = topics_of_cameras(bag, BOXES_TOPIC)
-    for topic, message in messages_on(bag, ['/' + TRUTH_TOPIC, '/' + TRACKS_TOPIC, '/tf'] + boxes_topics):
+    truth_topic, tracks_topic = topics_of_robot(bag)
+    for topic, message in messages_on(bag, [truth_topic, tracks_topic, '/tf'] + boxes_topics):
         if topic == '/tf':
             links.update({(link.header.frame_id, link.child_frame_id): transform_from_msg(link)
                           for link in message.transforms})
@@ -64,7 +67,7 @@ def read_recording(bag):
             boxes2d = boxes2d_from_msg(message)
             boxes[boxes2d.stamp_ns] = boxes2d.boxes
         else:
-            by_stamp = truth if topic == '/' + TRUTH_TOPIC else tracks
+            by_stamp = truth if topic == truth_topic else tracks
             by_stamp[stamp_of(message)] = message
     if not tracks:
         reason = ('but 3D boxes: probably tf lacks the pose of the camera; rosrun ros_3d_bb doctor checks it'
@@ -98,15 +101,17 @@ def table_of_tracks(moments):
 
 def write_csv(bag_path, csv_path):
     """Write each track of each image in a bag as a row of CSV_COLUMNS; covariances are empty if unknown."""
-    with rosbag.Bag(bag_path) as bag, open(csv_path, 'w', newline='') as stream:
-        rows = csv.writer(stream)
-        rows.writerow(CSV_COLUMNS)
-        for _topic, message in messages_on(bag, ['/' + TRACKS_TOPIC]):
+    text = io.StringIO()
+    rows = csv.writer(text)
+    rows.writerow(CSV_COLUMNS)
+    with rosbag.Bag(bag_path) as bag:
+        for _topic, message in messages_on(bag, topics_of_robot(bag)[1:]):
             stamp = '%d.%09d' % (message.header.stamp.secs, message.header.stamp.nsecs)
             for track in tracks_from_msg(message):
                 covariance = [''] * 3 if track.covariance is None else track.covariance[[0, 0, 1], [0, 1, 1]]
                 rows.writerow([stamp, track.id, track.label, track.status, *track.position_m[:2],
                                *track.velocity_mps[:2], *covariance])
+    atomic_write(csv_path, text.getvalue().encode())
 
 
 def topics_of_cameras(bag, topic):
@@ -114,6 +119,13 @@ def topics_of_cameras(bag, topic):
     ending = topic_of('?', topic)[1:]
     names = map(absolute, bag.get_type_and_topic_info().topics)
     return [name for name in names if name.endswith(ending)]
+
+
+def topics_of_robot(bag):
+    """Names of ground truth and tracks in an open bag, in the namespace of the tracks if there is only one."""
+    names = topics_of_cameras(bag, TRACKS_TOPIC)
+    namespace = names[0][:-len('/' + TRACKS_TOPIC)] if len(names) == 1 else ''
+    return ['%s/%s' % (namespace, topic) for topic in (TRUTH_TOPIC, TRACKS_TOPIC)]
 
 
 def messages_on(bag, topics):
