@@ -21,6 +21,13 @@ VIEW = CameraView(mounted(1.0), CAMERA)
 START_NS = 1000 * NS
 
 
+def view_from(x, y, height_m=1.0, camera='', **angles_deg):
+    """The view of a camera at a place, with the angles of `mounted`."""
+    transform = mounted(height_m, **angles_deg)
+    transform[:2, 3] = x, y
+    return CameraView(transform, CAMERA, camera)
+
+
 def at(x, y, height=1.7, cut='', width=0.5, sigma=0.04, **fields):
     """The detection of someone who stands at a place, truncated at the edges that `cut` names."""
     edges = tuple(edge in cut for edge in ('left', 'top', 'right', 'bottom'))
@@ -28,10 +35,18 @@ def at(x, y, height=1.7, cut='', width=0.5, sigma=0.04, **fields):
                      edges)._replace(**fields)
 
 
+def noisy(random, places_m, sigma_m=0.02):
+    """Detections of people at places (x, y) or (x, y, height), with errors of the position."""
+    errors_m = random.normal(0, sigma_m, (len(places_m), 2))
+    return [at(x + error_x, y + error_y, *height) for (x, y, *height), (error_x, error_y) in zip(places_m, errors_m)]
+
+
 def play(tracker, seconds, detections_at, rate_hz=30, start_s=0.0, view=VIEW):
-    """Update the tracker with `detections_at(seconds)`; returns the published tracks of each image."""
+    """Update the tracker with `detections_at(seconds)`; returns the published tracks of each image. The view may be a
+    function of the time, too."""
     times_s = [start_s + frame / rate_hz for frame in range(int(seconds * rate_hz))]
-    return [tracker.update(START_NS + int(round(time_s * NS)), detections_at(time_s), view) for time_s in times_s]
+    return [tracker.update(START_NS + int(round(time_s * NS)), detections_at(time_s),
+                           view(time_s) if callable(view) else view) for time_s in times_s]
 
 
 def standing(*places):
@@ -41,3 +56,8 @@ def standing(*places):
 
 def ids(objects):
     return [track.id for track in objects]
+
+
+def all_ids(published):
+    """IDs of the tracks of all images."""
+    return {track.id for objects in published for track in objects}

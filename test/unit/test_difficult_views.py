@@ -45,25 +45,42 @@ def detected_boxes(frame, camera, random, least_visible):
     return people, [tuple(box_px) for box_px in boxes_px.tolist()]
 
 
-def estimates(scenes, knows_tilt, least_visible=0.3):
-    """(person, Box3D, camera_from_map) of all people for whom there is an estimate, with the number of the others."""
+class Scene(object):
+    """An image of a scene: its people, and estimates from its depth."""
+
+    def __init__(self, simulator, frame=None):
+        self.frame, self.camera = frame or simulator.frame(0), simulator.camera
+        self.map_from_camera = self.frame.poses.map_from_camera
+        self.camera_from_map = np.linalg.inv(self.map_from_camera)
+        self.rects_px = [person.box_px and tuple(person.box_px) for person in self.frame.people]
+
+    @property
+    def depths_m(self):
+        """True depths of the people."""
+        return [transform_points(self.camera_from_map, person.position_m)[2] for person in self.frame.people]
+
+    def boxes(self, rects_px, labels=None, knows_tilt=True):
+        """The Box3D of each rectangle, or None."""
+        return estimate_boxes(DepthImage(self.frame.depth_mm, 0.001), rects_px, self.camera,
+                              estimator_named('foreground'), labels=labels,
+                              level_from_camera=level_rotation(self.camera_from_map[:3, 2]) if knows_tilt else LEVEL)
+
+    def error_m(self, person, box):
+        """Error in the plane."""
+        return np.linalg.norm((transform_points(self.map_from_camera, box.center_m) - person.position_m)[:2])
+
+
+def estimates(simulators, knows_tilt, least_visible=0.3):
+    """(person, Box3D, Scene) of all people for whom there is an estimate, with the number of the others."""
     found, missed, random = [], 0, np.random.RandomState(3)
-    for simulator in scenes:
+    for simulator in simulators:
         for number in range(simulator.frame_count):
-            frame = simulator.frame(number)
-            camera_from_map = np.linalg.inv(frame.poses.map_from_camera)
-            people, rects_px = detected_boxes(frame, simulator.camera, random, least_visible)
-            level = level_rotation(camera_from_map[:3, 2]) if knows_tilt else LEVEL
-            boxes = estimate_boxes(DepthImage(frame.depth_mm, 0.001), rects_px, simulator.camera,
-                                   estimator_named('foreground'), level_from_camera=level)
-            found += [(person, box, camera_from_map) for person, box in zip(people, boxes) if box is not None]
+            scene = Scene(simulator, simulator.frame(number))
+            people, rects_px = detected_boxes(scene.frame, scene.camera, random, least_visible)
+            boxes = scene.boxes(rects_px, knows_tilt=knows_tilt)
+            found += [(person, box, scene) for person, box in zip(people, boxes) if box is not None]
             missed += boxes.count(None)
     return found, missed
-
-
-def plane_errors_m(found):
-    return np.array([np.linalg.norm((transform_points(np.linalg.inv(camera_from_map), box.center_m)
-                                     - person.position_m)[:2]) for person, box, camera_from_map in found])
 
 
 @pytest.mark.parametrize('tilt_deg,median_m', [(20, 0.05), (28, 0.05), (45, 0.07)])
@@ -71,24 +88,11 @@ def test_positions_of_overlapping_people_below_a_tilted_camera(tilt_deg, median_
     scenes = [simulator_of(overlapping_people(4, 1.6, 4.5, np.random.RandomState(seed)), 2.35, tilt_deg, 2.0, 1.0, seed)
               for seed in range(6)]
     found, missed = estimates(scenes, knows_tilt=True)
-    errors_m = plane_errors_m(found)
+    errors_m, level_errors_m = ([scene.error_m(person, box) for person, box, scene in of]
+                                for of in (found, estimates(scenes, knows_tilt=False)[0]))
     assert missed <= 0.02 * len(found)
-    assert np.median(errors_m) < median_m and errors_m.max() < 0.4
-    level_errors_m = plane_errors_m(estimates(scenes, knows_tilt=False)[0])
+    assert np.median(errors_m) < median_m and max(errors_m) < 0.4
     assert np.median(level_errors_m) > 1.5 * np.median(errors_m)
-
-
-def level_boxes(simulator, rects_px, labels=None):
-    """The Box3D of each rectangle in the first image of a level camera, or None."""
-    return estimate_boxes(DepthImage(simulator.frame(0).depth_mm, 0.001), rects_px, simulator.camera,
-                          estimator_named('foreground'), labels=labels)
-
-
-def depths_m(simulator):
-    """True depths of the people in the first image."""
-    frame = simulator.frame(0)
-    return [transform_points(np.linalg.inv(frame.poses.map_from_camera), person.position_m)[2]
-            for person in frame.people]
 
 
 @pytest.mark.parametrize('nearest_mm', [500, 700])
@@ -98,9 +102,9 @@ def test_a_person_too_near_for_the_depth_camera_is_not_the_wall(name, nearest_mm
     too_near = 0
     for number in range(90, 180, 15):
         frame = simulator.frame(number)
-        depth = DepthImage(np.where(frame.depth_mm < nearest_mm, 0, frame.depth_mm).astype(np.uint16), 0.001)
-        box, = estimate_boxes(depth, [tuple(frame.people[0].box_px)], simulator.camera, estimator_named('foreground'))
-        true_m = transform_points(np.linalg.inv(frame.poses.map_from_camera), frame.people[0].position_m)[2]
+        frame.depth_mm[frame.depth_mm < nearest_mm] = 0
+        scene = Scene(simulator, frame)
+        (box,), (true_m,) = scene.boxes(scene.rects_px), scene.depths_m
         too_near += true_m < nearest_mm / 1000.0
         assert plausible(box) is None or abs(box.center_m[2] - true_m) < 0.5
     assert too_near
@@ -110,59 +114,53 @@ def test_a_person_too_near_for_the_depth_camera_is_not_the_wall(name, nearest_mm
 @pytest.mark.parametrize('ahead_m', [2.0, 3.0, 4.0])
 @pytest.mark.parametrize('wider,lower_edge', [(0, 1), (0, 0.5), (0.15, 1)], ids=['same', 'upper half', 'wider'])
 def test_a_second_box_of_a_person_is_no_person_on_the_wall(height_m, ahead_m, wider, lower_edge):
-    simulator = simulator_of([{'start': [ahead_m, 0.2], 'facing': 2.6, 'height': 1.75}], height_m, wall_m=6.0)
-    x1, y1, x2, y2 = first_px = np.rint(simulator.frame(0).people[0].box_px).astype(int).tolist()
+    scene = Scene(simulator_of([{'start': [ahead_m, 0.2], 'facing': 2.6, 'height': 1.75}], height_m, wall_m=6.0))
+    x1, y1, x2, y2 = first_px = scene.rects_px[0]
     more_px = int(wider * (x2 - x1))
     second_px = x1 - more_px, y1, x2 + more_px, y1 + int(lower_edge * (y2 - y1))
-    found = [box for box in level_boxes(simulator, [tuple(first_px), second_px]) if box is not None]
-    assert found and all(abs(box.center_m[2] - depths_m(simulator)[0]) < 0.3 for box in found)
+    found = [box for box in scene.boxes([first_px, second_px]) if box is not None]
+    assert found and all(abs(box.center_m[2] - scene.depths_m[0]) < 0.3 for box in found)
 
 
 def test_a_second_box_of_a_partly_hidden_person_is_no_person_on_the_wall():
-    simulator = simulator_of([{'start': [3.3, -0.62], 'facing': 3.1, 'height': 1.7},
-                              {'start': [5.15, -0.42], 'facing': 3.1, 'height': 1.8}], 0.9, wall_m=9.0)
-    near_px, far_px = [tuple(person.box_px) for person in simulator.frame(0).people]
-    x1, y1, x2, y2 = far_px
+    scene = Scene(simulator_of([{'start': [3.3, -0.62], 'facing': 3.1, 'height': 1.7},
+                                {'start': [5.15, -0.42], 'facing': 3.1, 'height': 1.8}], 0.9, wall_m=9.0))
+    near_px, (x1, y1, x2, y2) = scene.rects_px
     assert x1 + 20 < near_px[0] < x2 - 10
-    boxes = level_boxes(simulator, [near_px, far_px, (x1 - 3, y1 + 5, x2 - 5, (y1 + y2) // 2)])
-    assert [box and box.center_m[2] for box in boxes[:2]] == pytest.approx(depths_m(simulator), abs=0.2)
+    boxes = scene.boxes(scene.rects_px + [(x1 - 3, y1 + 5, x2 - 5, (y1 + y2) // 2)])
+    assert [box and box.center_m[2] for box in boxes[:2]] == pytest.approx(scene.depths_m, abs=0.2)
     assert boxes[2] is None
 
 
 @pytest.mark.parametrize('ahead_m,face_m,facing', [(4.2, 0.5, 3.14), (4.2, 0.6, 2.7), (3.0, 0.5, 2.7), (3.0, 0.6, 2.7)])
 def test_a_person_who_carries_a_box(ahead_m, face_m, facing):
-    simulator = simulator_of([{'start': [ahead_m, 0.2], 'facing': facing, 'height': 1.7}], 0.9, wall_m=6.0)
-    frame = simulator.frame(0)
+    scene = Scene(simulator_of([{'start': [ahead_m, 0.2], 'facing': facing, 'height': 1.7}], 0.9, wall_m=6.0))
     front_m = [(ahead_m - face_m, y, z) for y, z in ((0.4, 1.25), (0.0, 0.95))]
-    camera_from_map = np.linalg.inv(frame.poses.map_from_camera)
-    front_m = transform_points(camera_from_map, np.array(front_m))
-    (left, top), (right, bottom) = simulator.camera.project(front_m).astype(int)
-    frame.depth_mm[top:bottom, left:right] = 1000 * front_m[0, 2]
-    box, = estimate_boxes(DepthImage(frame.depth_mm, 0.001), [frame.people[0].box_px], simulator.camera,
-                          estimator_named('foreground'))
-    assert plane_errors_m([(frame.people[0], box, camera_from_map)])[0] < 0.1
+    front_m = transform_points(scene.camera_from_map, np.array(front_m))
+    (left, top), (right, bottom) = scene.camera.project(front_m).astype(int)
+    scene.frame.depth_mm[top:bottom, left:right] = 1000 * front_m[0, 2]
+    assert scene.error_m(scene.frame.people[0], scene.boxes(scene.rects_px)[0]) < 0.1
 
 
 @pytest.mark.parametrize('height_m,adult_m,gap_m', [
     (0.27, 5.0, 0.3), (0.27, 5.0, 0.5), (1.2, 2.5, 0.3), (1.2, 3.5, 0.8)])
 def test_a_child_before_an_adult(height_m, adult_m, gap_m):
-    simulator = simulator_of([{'start': [adult_m - gap_m, 0.05], 'facing': 3.1, 'height': 1.1},
-                              {'start': [adult_m, 0.0], 'facing': 3.1, 'height': 1.8}], height_m)
-    random, child_m, frame = np.random.RandomState(0), depths_m(simulator)[0], simulator.frame(0)
+    scene = Scene(simulator_of([{'start': [adult_m - gap_m, 0.05], 'facing': 3.1, 'height': 1.1},
+                                {'start': [adult_m, 0.0], 'facing': 3.1, 'height': 1.8}], height_m))
+    random = np.random.RandomState(0)
     for _draw in range(20):
-        _people, rects_px = detected_boxes(frame, simulator.camera, random, 0)
-        child = level_boxes(simulator, rects_px)[0]
-        assert abs(child.center_m[2] - child_m) < 0.25
+        _people, rects_px = detected_boxes(scene.frame, scene.camera, random, 0)
+        assert abs(scene.boxes(rects_px)[0].center_m[2] - scene.depths_m[0]) < 0.25
 
 
 @pytest.mark.parametrize('height_m,counter_m,near_m,far_m', [
     (0.6, 0.5, 2.0, 3.0), (1.2, 0.9, 2.0, 5.0), (1.2, 0.9, 2.6, 4.0)])
 def test_a_person_behind_a_counter_before_another_one(height_m, counter_m, near_m, far_m):
-    simulator = simulator_of([{'start': [near_m, 0.0], 'facing': 3.1, 'height': 1.7},
-                              {'start': [far_m, 0.1 * far_m], 'facing': 3.1, 'height': 1.8}], height_m,
-                             furniture=[{'at': [near_m - 0.55, -0.35], 'size': [0.6, 1.2, counter_m]}])
-    boxes = level_boxes(simulator, [tuple(person.box_px) for person in simulator.frame(0).people])
-    assert [box.center_m[2] for box in boxes] == pytest.approx(depths_m(simulator), abs=0.2)
+    scene = Scene(simulator_of([{'start': [near_m, 0.0], 'facing': 3.1, 'height': 1.7},
+                                {'start': [far_m, 0.1 * far_m], 'facing': 3.1, 'height': 1.8}], height_m,
+                               furniture=[{'at': [near_m - 0.55, -0.35], 'size': [0.6, 1.2, counter_m]}]))
+    boxes = scene.boxes(scene.rects_px)
+    assert [box.center_m[2] for box in boxes] == pytest.approx(scene.depths_m, abs=0.2)
 
 
 @pytest.mark.parametrize('height_m', [0.27, 0.9, 1.3])
@@ -170,15 +168,13 @@ def test_a_person_behind_a_counter_before_another_one(height_m, counter_m, near_
 def test_a_person_on_a_couch(height_m, ahead_m):
     couch = [{'at': [ahead_m + 0.35, 0.0], 'size': [0.2, 1.9, 0.85]},
              {'at': [ahead_m, 0.75], 'size': [0.8, 0.4, 0.6]}, {'at': [ahead_m, -0.75], 'size': [0.8, 0.4, 0.6]}]
-    simulator = simulator_of([{'start': [ahead_m, 0.0], 'facing': 3.14, 'height': 1.75, 'crouch': 0.7}], height_m,
-                             furniture=couch)
+    scene = Scene(simulator_of([{'start': [ahead_m, 0.0], 'facing': 3.14, 'height': 1.75, 'crouch': 0.7}], height_m,
+                               furniture=couch))
     corners_m = np.array([(ahead_m + x, y, z) for x in (-0.4, 0.45) for y in (-0.95, 0.95) for z in (0, 0.85)])
-    frame = simulator.frame(0)
-    corners_px = simulator.camera.project(transform_points(np.linalg.inv(frame.poses.map_from_camera), corners_m))
+    corners_px = scene.camera.project(transform_points(scene.camera_from_map, corners_m))
     couch_px = np.clip(np.hstack((corners_px.min(axis=0), corners_px.max(axis=0))), 0, [640, 480] * 2).astype(int)
-    rects_px = [tuple(frame.people[0].box_px), tuple(couch_px.tolist())]
-    alone, = level_boxes(simulator, rects_px[:1], ['person'])
-    person, _couch = level_boxes(simulator, rects_px, ['person', 'couch'])
+    alone, = scene.boxes(scene.rects_px, ['person'])
+    person, _couch = scene.boxes(scene.rects_px + [tuple(couch_px.tolist())], ['person', 'couch'])
     assert person.center_m == pytest.approx(alone.center_m, abs=0.1)
 
 
@@ -187,17 +183,14 @@ def test_a_person_behind_a_table_below_a_tilted_camera_in_a_loose_box(ahead_m, w
     """The wall is one compact layer because the tilt is known, and larger than the person in a loose box."""
     furniture = [{'at': [ahead_m - 0.6, 0.4], 'size': [0.7, 1.4, 0.74]},
                  {'at': [ahead_m + 0.33, 0.4], 'size': [0.06, 0.45, 0.95]}]
-    simulator = simulator_of([{'start': [ahead_m, 0.4], 'facing': 3.0, 'height': 1.7, 'crouch': 0.6}], 2.35, 28,
-                             furniture=furniture, wall_m=wall_m)
-    frame, random = simulator.frame(0), np.random.RandomState(2)
-    camera_from_map = np.linalg.inv(frame.poses.map_from_camera)
-    tight_px = np.array(frame.people[0].box_px)
+    scene = Scene(simulator_of([{'start': [ahead_m, 0.4], 'facing': 3.0, 'height': 1.7, 'crouch': 0.6}], 2.35, 28,
+                               furniture=furniture, wall_m=wall_m))
+    tight_px, random = np.array(scene.rects_px[0]), np.random.RandomState(2)
     extents_px = np.tile(tight_px[2:] - tight_px[:2], 2)
     for _draw in range(20):
         rect_px = np.clip(tight_px + random.uniform(0, 0.6, 4) * extents_px * [-1, -1, 1, 1], 0, [640, 480] * 2)
-        box, = estimate_boxes(DepthImage(frame.depth_mm, 0.001), [tuple(map(int, rect_px))], simulator.camera,
-                              estimator_named('foreground'), level_from_camera=level_rotation(camera_from_map[:3, 2]))
-        assert plane_errors_m([(frame.people[0], box, camera_from_map)])[0] < 0.3
+        box, = scene.boxes([tuple(map(int, rect_px))])
+        assert scene.error_m(scene.frame.people[0], box) < 0.3
 
 
 CHEST_M = [0.3, 0.292, 0.763]
@@ -211,10 +204,9 @@ CHEST_M = [0.3, 0.292, 0.763]
     (0.9, [4.394, -0.561], 2.57, 1.9, [3.801, -0.686], [0.3, 0.579, 0.885], 0.7)])
 def test_a_person_who_crouches_behind_a_chest(camera_m, start_m, facing, height_m, chest_at_m, chest_m, behind_m):
     person = {'start': start_m, 'facing': facing, 'height': height_m, 'crouch': 0.7}
-    simulator = simulator_of([person], camera_m, furniture=[{'at': chest_at_m, 'size': chest_m}],
-                             wall_m=start_m[0] + behind_m)
-    box, = level_boxes(simulator, [simulator.frame(0).people[0].box_px])
-    assert box.center_m[2] == pytest.approx(depths_m(simulator)[0], abs=0.3)
+    scene = Scene(simulator_of([person], camera_m, furniture=[{'at': chest_at_m, 'size': chest_m}],
+                               wall_m=start_m[0] + behind_m))
+    assert scene.boxes(scene.rects_px)[0].center_m[2] == pytest.approx(scene.depths_m[0], abs=0.3)
 
 
 POSES = {'still': {}, 'left arm out': dict(lift_l=1.57), 'right arm out': dict(lift_r=1.57),
@@ -228,14 +220,12 @@ def posed_person(simulator, angles):
     state = simulator.state_at(0)
     person, = state.people
     posture = person.posture._replace(**angles)
-    frame = simulator.frame(0, state._replace(people=[person._replace(posture=posture)]))
-    camera_from_map = np.linalg.inv(frame.poses.map_from_camera)
-    box, = estimate_boxes(DepthImage(frame.depth_mm, 0.001), [frame.people[0].box_px], simulator.camera,
-                          estimator_named('foreground'), level_from_camera=level_rotation(camera_from_map[:3, 2]))
+    scene = Scene(simulator, simulator.frame(0, state._replace(people=[person._replace(posture=posture)])))
+    box, = scene.boxes(scene.rects_px)
     without_arms = simulator.bodies[0].posed(posture._replace(lift_l=0, lift_r=0, reach=0))
-    _ahead_m, left_m, up_m = transform_points(np.linalg.inv(camera_from_map), box.center_m)
+    _ahead_m, left_m, up_m = transform_points(scene.map_from_camera, box.center_m)
     standing_m = without_arms.vertices[:, 2].max()
-    return left_m - frame.people[0].position_m[1], box.size_m[1] - standing_m, up_m - standing_m / 2
+    return left_m - scene.frame.people[0].position_m[1], box.size_m[1] - standing_m, up_m - standing_m / 2
 
 
 @pytest.mark.parametrize('facing', [3.14, 2.2, 1.57, 0.0])
@@ -256,9 +246,9 @@ def test_covariances_hold_for_any_support():
               for seed in range(14)]
     found, _missed = estimates(scenes, knows_tilt=True, least_visible=0.1)
     distances, supports = [], []
-    for person, box, camera_from_map in found:
+    for person, box, scene in found:
         corrected, = corrected_boxes([box], model)
-        error_m = (corrected.center_m - transform_points(camera_from_map, person.position_m))[[0, 2]]
+        error_m = (corrected.center_m - transform_points(scene.camera_from_map, person.position_m))[[0, 2]]
         covariance_m2 = corrected.covariance_m2[np.ix_([0, 2], [0, 2])]
         distances.append(error_m.dot(np.linalg.solve(covariance_m2, error_m)))
         supports.append(box.support)

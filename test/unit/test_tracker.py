@@ -5,8 +5,8 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.measurement_model import NoiseParams
 from ros_3d_bb.tracking.track import PredictionParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
-from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView
-from support.people import CAMERA, START_NS, VIEW, at, ids, mounted, play, standing
+from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
+from support.people import START_NS, VIEW, all_ids, at, ids, noisy, play, standing, view_from
 
 
 @pytest.mark.parametrize('rate_hz', [3, 5, 10, 20, 30, 60])
@@ -87,7 +87,7 @@ def test_a_person_whose_legs_are_hidden_keeps_the_id():
         upper = at(3, y, height=1.05, position_m=np.array([3, y, 1.7 - 1.05 / 2]))
         return [at(3, y)] if time_s < 1.1 else [upper] if time_s > 1.5 else []
     published = play(Tracker(), 3, walking)
-    assert {track_id for objects in published for track_id in ids(objects)} == {1}
+    assert all_ids(published) == {1}
     assert published[50][0].status == VISIBLE
 
 
@@ -105,48 +105,26 @@ def test_an_end_that_is_sometimes_truncated_does_not_change_the_height():
     assert np.ptp(heights_m) < 0.01
 
 
-def test_boxes_with_the_depth_of_the_background_do_not_move_the_track():
-    """One box in ten is 0.8 m too far."""
-    walk = play(Tracker(), 3, lambda time_s: [at(3 + 0.8 * (int(30 * time_s + 0.5) % 10 == 9), 0)])
-    errors_m = [abs(track.position_m[0] - 3) for objects in walk[15:] for track in objects]
-    assert len(errors_m) == 75 and max(errors_m) < 0.15
+@pytest.mark.parametrize('rate_hz,offset_m,from_s,error_m', [
+    (30, lambda number: 0.8 * (number % 10 == 9), 0.5, 0.15),  # one box in ten has the depth of the background
+    (30, lambda number: 0.4 * (3 <= number < 10), 0.5, 0.2),  # those of a new person, whose velocity is unknown
+    (30, lambda number: 0.6 * (3 <= number < 10), 0.5, 0.2),
+    (30, lambda number: 0.45 * (number < 90), 3.5, 0.1)] + [  # for long
+    (rate_hz, lambda number: -0.45 * (number % 7 == 6), 2, 0.1) for rate_hz in (7.5, 15, 30, 60)])  # as of a hand
+def test_boxes_with_a_wrong_depth_do_not_move_a_person_who_stands(rate_hz, offset_m, from_s, error_m):
+    walk = play(Tracker(), 6, lambda time_s: [at(3 + offset_m(round(rate_hz * time_s)), 0)], rate_hz)
+    assert all_ids(walk) == {1}
+    for track, in walk[int(from_s * rate_hz):]:
+        assert abs(track.position_m[0] - 3) < error_m
+    assert max(np.linalg.norm(track.velocity_mps) for track, in walk[int(2 * rate_hz):]) < 0.1
 
 
-@pytest.mark.parametrize('behind_m', [0.4, 0.6])
-def test_a_new_person_keeps_the_id_after_boxes_of_background_depth(behind_m):
-    """They move the track, whose velocity is unknown, so that the next box is nearer than its gate."""
-    walk = play(Tracker(), 1, lambda time_s: [at(3 + behind_m * (3 <= round(30 * time_s) < 10), 0)])
-    assert {track_id for objects in walk for track_id in ids(objects)} == {1}
-    assert max(abs(objects[0].position_m[0] - 3) for objects in walk[14:]) < 0.2
-
-
-@pytest.mark.parametrize('rate_hz', [7.5, 15, 30, 60])
-def test_boxes_of_something_nearer_do_not_move_a_person_who_stands(rate_hz):
-    """One box in seven is 0.45 m too near, as of a hand. Before, the speed was up to 2 m/s."""
-    walk = play(Tracker(), 6, lambda time_s: [at(3 - 0.45 * (round(rate_hz * time_s) % 7 == 6), 0)], rate_hz)
-    assert {track_id for objects in walk for track_id in ids(objects)} == {1}
-    for track, in walk[int(2 * rate_hz):]:
-        assert abs(track.position_m[0] - 3) < 0.1 and np.linalg.norm(track.velocity_mps) < 0.1
-
-
-def test_a_person_whom_boxes_of_background_depth_have_moved_for_long_is_moved_back():
-    """They last for 3 s."""
-    walk = play(Tracker(), 5, lambda time_s: [at(3 + 0.45 * (time_s < 3), 0)])
-    assert {track_id for objects in walk for track_id in ids(objects)} == {1}
-    assert max(abs(objects[0].position_m[0] - 3) for objects in walk[105:]) < 0.1
-
-
-def test_a_truncated_box_shows_only_one_side_of_a_person():
-    """The centre of the visible half of a body is 0.125 m from that of the person."""
-    track, = play(Tracker(), 1, lambda _time_s: [at(3, 1.5, cut='left', width=0.25)])[-1]
-    assert track.position_m[1] == pytest.approx(1.5 + 0.125, abs=0.03)
-
-
-@pytest.mark.parametrize('y', [-0.02, 0.02, 1.3])
-def test_a_slim_person_truncated_above_is_at_the_position_of_the_box(y):
-    """The whole width is visible."""
-    track, = play(Tracker(), 1, lambda _time_s: [at(3, y, cut='top', width=0.38)])[-1]
-    assert track.position_m[1] == pytest.approx(y, abs=0.01)
+@pytest.mark.parametrize('y,cut,width,expected', [
+    (1.5, 'left', 0.25, 1.612), (-0.02, 'top', 0.38, -0.02), (0.02, 'top', 0.38, 0.02), (1.3, 'top', 0.38, 1.3)])
+def test_a_truncated_box_is_completed_where_it_is_narrower_than_a_person(y, cut, width, expected):
+    """The border at the left hides half of a body, 0.125 m at right angles to the ray; that above, no width."""
+    track, = play(Tracker(), 1, lambda _time_s: [at(3, y, cut=cut, width=width)])[-1]
+    assert track.position_m[1] == pytest.approx(expected, abs=0.01)
 
 
 def cut_by(cut, visible_height, bottom=0.0):
@@ -202,14 +180,7 @@ def test_the_height_of_a_person_is_constant_on_a_slope(slope, cut, height):
     def walk(time_s):
         box = cut_by(cut, height) if 1 < time_s < 6 else at(2, 0)
         return [box._replace(position_m=box.position_m + (time_s, 0, slope * time_s))]
-
-    def view_at(time_s):
-        transform = VIEW.fixed_from_camera.copy()
-        transform[:3, 3] += time_s, 0, slope * time_s
-        return VIEW._replace(fixed_from_camera=transform)
-    tracker, published = Tracker(), []
-    for frame in range(240):
-        published.append(tracker.update(START_NS + frame * NS // 30, walk(frame / 30), view_at(frame / 30)))
+    published = play(Tracker(), 8, walk, view=lambda time_s: view_from(time_s, 0, 1 + slope * time_s))
     assert set(ids(objects)[0] for objects in published[4:]) == {1}
     assert all(abs(objects[0].size_m[2] - 1.7) < 0.1 for objects in published[4:])
     assert published[-1][0].position_m[2] == pytest.approx(0.85 + slope * 7.97, abs=0.05)
@@ -227,18 +198,15 @@ def turned(points, angle):
 @pytest.mark.parametrize('jump_m,angle', [((0, 0.5), 0), ((0.5, 0), 0), ((-0.35, 0.35), 0), ((0, 0), 0.12),
                                           ((0.3, 0.2), -0.1)])
 def test_people_keep_their_ids_when_the_odometry_jumps(jump_m, angle, rate_hz):
-    random = np.random.RandomState(1)
+    random, tracker = np.random.RandomState(1), Tracker()
 
     def places(time_s):
         return turned(CROWD + time_s * CROWD_MPS, angle * (time_s >= 1)) + np.multiply(jump_m, time_s >= 1)
 
     def detections(time_s):
-        return [at(*place) for place in places(time_s) + random.normal(0, 0.02, CROWD.shape)]
-    tracker = Tracker()
+        return noisy(random, places(time_s))
     before = play(tracker, 1, detections, rate_hz)[-1]
-    jumped = mounted(1, yaw_deg=np.degrees(angle))
-    jumped[:2, 3] = jump_m
-    after = play(tracker, 1, detections, rate_hz, 1, CameraView(jumped, CAMERA))
+    after = play(tracker, 1, detections, rate_hz, 1, view_from(*jump_m, yaw_deg=np.degrees(angle)))
     assert ids(before) == [1, 2, 3, 4, 5] and tracker.totals.common_motions == 1
     for frame, objects in enumerate(after):
         assert ids(objects) == ids(before)
@@ -254,29 +222,25 @@ def test_people_keep_their_ids_when_the_odometry_jumps(jump_m, angle, rate_hz):
 def test_a_jump_of_the_pose_gives_standing_people_no_velocity(jump_m, people, rate_hz):
     """The robot drives; the people are too few to show the jump by themselves."""
     random, tracker = np.random.RandomState(2), Tracker()
-    for frame in range(int(4 * rate_hz)):
-        time_s = frame / rate_hz
-        offset_m = np.multiply(jump_m, time_s >= 2)
-        pose = mounted(1)
-        pose[:2, 3] = offset_m + (0.3 * time_s, 0)
-        places = CROWD[:people] + offset_m + random.normal(0, 0.02, (people, 2))
-        tracks = tracker.update(START_NS + int(round(time_s * NS)), [at(*place) for place in places],
-                                CameraView(pose, CAMERA))
-        if time_s >= 3:
-            assert ids(tracks) == [1, 2][:people]
-            assert max(np.linalg.norm(track.velocity_mps) for track in tracks) < 0.2
+
+    def offset_m(time_s):
+        return np.multiply(jump_m, time_s >= 2)
+    published = play(tracker, 4, lambda time_s: noisy(random, CROWD[:people] + offset_m(time_s)), rate_hz,
+                     view=lambda time_s: view_from(*offset_m(time_s) + (0.3 * time_s, 0)))
+    for tracks in published[3 * rate_hz:]:
+        assert ids(tracks) == [1, 2][:people]
+        assert max(np.linalg.norm(track.velocity_mps) for track in tracks) < 0.2
     assert tracker.totals.common_motions == 1
 
 
 def test_a_person_who_steps_aside_does_not_move_the_frame():
     """The robot starts with 2 m/s2; the person steps by 0.5 m."""
     tracker = Tracker()
-    for frame in range(20):
-        time_s = frame / 5
-        pose = mounted(1)
-        pose[0, 3] = max(time_s - 2, 0) ** 2
-        tracker.update(START_NS + int(round(time_s * NS)), [at(3 + pose[0, 3], 0.5 * (time_s >= 2))],
-                       CameraView(pose, CAMERA))
+
+    def driven_m(time_s):
+        return max(time_s - 2, 0) ** 2
+    play(tracker, 4, lambda time_s: [at(3 + driven_m(time_s), 0.5 * (time_s >= 2))], 5,
+         view=lambda time_s: view_from(driven_m(time_s), 0))
     assert not tracker.totals.common_motions
 
 
@@ -300,11 +264,9 @@ def test_the_velocities_of_people_who_turn_together_follow_the_turn(rate_hz):
         first = np.array([4.0 + 1.4 * (turned_s ** 2 + max(time_s - 2.5, 0)),
                           1.4 * (min(time_s, 2) + turned_s - turned_s ** 2) - 3])
         return first + 0.8 * np.arange(3)[:, None] * (1, 0)
-
-    def detections(time_s):
-        return [at(*place) for place in places(time_s) + random.normal(0, 0.03, (3, 2))]
     random, tracker = np.random.RandomState(0), Tracker()
-    objects = play(tracker, 4.5, detections, rate_hz, view=CameraView(mounted(1), None))[-1]
+    objects = play(tracker, 4.5, lambda time_s: noisy(random, places(time_s), 0.03), rate_hz,
+                   view=VIEW._replace(intrinsics=None))[-1]
     assert len(objects) == 3 and tracker.totals.common_motions <= 1
     for track in objects:
         np.testing.assert_allclose(track.velocity_mps[:2], (1.4, 0), atol=0.4)

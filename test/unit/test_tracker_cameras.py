@@ -15,14 +15,15 @@ from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.out_of_sequence import LATEST_NS, MOST_KEPT
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView
-from support.people import CAMERA, START_NS, at, ids, mounted
+from support import people
+from support.people import CAMERA, START_NS, at, ids, mounted, view_from
 
 PERIOD_NS = NS // 30
 EDGE = 0.6  # x / z of what the image border shows
 
 
 def looking(yaw, camera):
-    return CameraView(mounted(1.0, yaw_deg=np.degrees(yaw)), CAMERA, camera)
+    return view_from(0, 0, camera=camera, yaw_deg=np.degrees(yaw))
 
 
 FRONT, LEFT = looking(0, 'front'), looking(np.pi / 4, 'left')
@@ -34,23 +35,22 @@ def around(bearing, range_m=3.0):
     return np.array([range_m * np.cos(bearing), range_m * np.sin(bearing)])
 
 
-def shown(view, place_m, offset_m=(0, 0)):
-    """The detections of a person, none outside of the view; `offset_m` is the calibration error."""
-    distance, bearing = view.bearings(np.array([place_m]))
-    if not abs(np.tan(bearing[0])) < EDGE - 0.05 or abs(bearing[0]) > 1:
-        return []
-    return [at(*np.add(place_m, offset_m))]
+def shown(view, *places_m, offset_m=(0, 0)):
+    """The detections of people, none outside of the view; `offset_m` is the calibration error."""
+    bearings = [view.bearings(np.array([place_m]))[1][0] for place_m in places_m]
+    return [at(*np.add(place_m, offset_m)) for place_m, bearing in zip(places_m, bearings)
+            if abs(np.tan(bearing)) < EDGE - 0.05 and abs(bearing) <= 1]
 
 
-def images_of(seconds, place_at, views=(FRONT, LEFT), start_s=0.0, offsets_m=None):
-    """(stamp_ns, detections, view) of cameras that take turns at 30 Hz each; `place_at(seconds)` may be None."""
-    images = []
-    for number in range(int(seconds * 30) * len(views)):
-        view = views[number % len(views)]
-        stamp_ns = START_NS + int(start_s * NS) + number * PERIOD_NS // len(views)
-        place_m = place_at((stamp_ns - START_NS) / NS)
-        found = [] if place_m is None else shown(view, place_m, (offsets_m or {}).get(view.camera, (0, 0)))
-        images.append((stamp_ns, found, view))
+def images_of(seconds, places_at, views=(FRONT, LEFT), start_s=0.0, rate_hz=30, offset_m=(0, 0), sigma_m=0.0, seed=0):
+    """(stamp_ns, detections, view) of cameras that take turns at `rate_hz` each, of people at `places_at(seconds)`.
+    `offset_m` is the calibration error of LEFT, and `sigma_m` that of positions."""
+    random, images = np.random.RandomState(seed), []
+    for number in range(int(seconds * rate_hz) * len(views)):
+        view, time_s = views[number % len(views)], start_s + number / (rate_hz * len(views))
+        found = shown(view, *places_at(time_s), offset_m=offset_m if view is LEFT else (0, 0))
+        images.append((START_NS + int(round(time_s * NS)), [
+            person._replace(position_m=person.position_m + random.normal(0, sigma_m, 3)) for person in found], view))
     return images
 
 
@@ -58,8 +58,8 @@ def play(tracker, images):
     return [tracker.update(*image) for image in images]
 
 
-def standing(bearing):
-    return lambda _time_s: around(bearing)
+def standing(*bearings):
+    return lambda _time_s: [around(bearing) for bearing in bearings]
 
 
 def low_camera(depth_m):
@@ -74,23 +74,21 @@ def test_a_person_before_a_low_camera_stays_while_the_place_is_occupied(views):
     def cameras(depth_m):
         return [{'low': low_camera(depth_m), 'left': LEFT}[name] for name in views]
     tracker = Tracker()
-    play(tracker, images_of(1, lambda _time_s: (1.0, 0.0), cameras(0.95)))
-    occupied = play(tracker, images_of(10, lambda _time_s: None, cameras(0.95), start_s=1))
+    play(tracker, images_of(1, lambda _time_s: [(1.0, 0.0)], cameras(0.95)))
+    occupied = play(tracker, images_of(10, standing(), cameras(0.95), start_s=1))
     assert all([(track.id, track.status) for track in objects] == [(1, OCCLUDED)] for objects in occupied[len(views):])
     assert np.sqrt(occupied[-1][0].covariance[0, 0]) < 0.4
-    free = play(tracker, images_of(1, lambda _time_s: None, cameras(4.0), start_s=11))
+    free = play(tracker, images_of(1, standing(), cameras(4.0), start_s=11))
     assert free[-1] == []
 
 
 @pytest.mark.parametrize('speed_mps', [0.5, 1.0, 1.5])
 def test_a_person_who_walks_up_to_a_low_camera_and_stops_stays_before_it(speed_mps):
     """The detector finds the person up to 1.3 m. Before, the track went on through the robot, which then drove on."""
-    tracker = Tracker()
-    for number in range(10 * 30):
-        x_m = max(3.0 - speed_mps * number / 30, 0.8)
-        stamp_ns, view = START_NS + number * PERIOD_NS, low_camera(x_m - 0.1)
-        objects = tracker.update(stamp_ns, shown(view, (x_m, 0.0)) if x_m > 1.3 else [], view)
-    track, = objects
+    def x_at(time_s):
+        return max(3.0 - speed_mps * time_s, 0.8)
+    track, = people.play(Tracker(), 10, lambda time_s: [at(x_at(time_s), 0)] if x_at(time_s) > 1.3 else [],
+                         view=lambda time_s: low_camera(x_at(time_s) - 0.1))[-1]
     assert (track.id, track.status) == (1, OCCLUDED) and 0.5 < track.position_m[0] <= 0.9
     assert np.linalg.norm(track.velocity_mps) < 0.05 and 0.5 < track.prediction_m[-1, 0] <= 0.9
 
@@ -98,13 +96,13 @@ def test_a_person_who_walks_up_to_a_low_camera_and_stops_stays_before_it(speed_m
 def test_a_wall_behind_a_person_who_has_left_does_not_keep_the_track():
     """The person stood 0.3 m before it. Afterwards the robot, which stands, sees only the wall."""
     tracker, wall = Tracker(), [low_camera(1.3)]
-    play(tracker, images_of(1, lambda _time_s: (1.0, 0.0), wall))
-    left = play(tracker, images_of(45, lambda _time_s: None, wall, start_s=1)[::10])
+    play(tracker, images_of(1, lambda _time_s: [(1.0, 0.0)], wall))
+    left = play(tracker, images_of(45, standing(), wall, start_s=1)[::10])
     assert all(ids(objects) == [1] for objects in left[:3 * 29]) and not any(left[3 * 36:])
 
 
 def test_a_person_who_walks_from_one_view_to_the_other_keeps_the_id():
-    published = play(Tracker(), images_of(4, lambda time_s: around(0.3 * time_s - 0.3)))
+    published = play(Tracker(), images_of(4, lambda time_s: [around(0.3 * time_s - 0.3)]))
     assert all([(track.id, track.status) for track in objects] == [(1, VISIBLE)] for objects in published[20:])
     speed_mps = np.linalg.norm(published[-1][0].velocity_mps)
     assert speed_mps == pytest.approx(0.9, abs=0.1)
@@ -115,22 +113,15 @@ def test_a_person_who_walks_from_one_view_to_the_other_keeps_the_id():
 @given(st.floats(0, 0.3), st.floats(-np.pi, np.pi), st.integers(0, 1000))
 def test_one_person_is_one_track_though_the_cameras_do_not_quite_agree(apart_m, direction, seed):
     """About where somebody is whom both see, by up to 0.3 m."""
-    random = np.random.RandomState(seed)
-    images = images_of(1.5, standing(IN_BOTH), offsets_m={'left': around(direction, apart_m)})
-    noisy = [(stamp_ns, [found._replace(position_m=found.position_m + random.normal(0, 0.04, 3)) for found in
-                         detections], view) for stamp_ns, detections, view in images]
-    published = play(Tracker(), noisy)
+    published = play(Tracker(), images_of(1.5, standing(IN_BOTH), offset_m=around(direction, apart_m), sigma_m=0.04,
+                                          seed=seed))
     assert all(ids(objects) == [1] for objects in published[20:])
 
 
 def test_two_people_side_by_side_in_both_views_are_two_tracks():
     """0.7 m apart, where the cameras disagree by 0.15 m."""
     places = [around(IN_BOTH, 2.5), around(IN_BOTH, 2.5) + (0.5, 0.5)]
-    tracker = Tracker()
-    for stamp_ns, _detections, view in images_of(3, standing(IN_BOTH)):
-        offset_m = (0.15, 0) if view is LEFT else (0, 0)
-        objects = tracker.update(stamp_ns, [found for place_m in places for found in shown(view, place_m, offset_m)],
-                                 view)
+    objects = play(Tracker(), images_of(3, lambda _time_s: places, offset_m=(0.15, 0)))[-1]
     assert ids(objects) == [1, 2]
     for track, place_m in zip(objects, places):
         assert np.linalg.norm(track.position_m[:2] - place_m) < 0.2
@@ -138,10 +129,8 @@ def test_two_people_side_by_side_in_both_views_are_two_tracks():
 
 def test_a_camera_that_ends_neither_keeps_tracks_nor_delays_others():
     """Its people remain visible for one second, are then out of view for one, and then unpublished."""
-    tracker, places = Tracker(), [around(IN_FRONT), around(AT_LEFT)]
-    for stamp_ns, _none, view in images_of(1, standing(IN_FRONT)):
-        tracker.update(stamp_ns, [found for place_m in places for found in shown(view, place_m)], view)
-    assert ids(tracker.tracks()) == [1, 2]
+    tracker = Tracker()
+    assert ids(play(tracker, images_of(1, standing(IN_FRONT, AT_LEFT)))[-1]) == [1, 2]
     after = play(tracker, images_of(7, standing(IN_FRONT), views=(FRONT,), start_s=1.0))
     assert all((objects[0].id, objects[0].status) == (1, VISIBLE) for objects in after)
     others = [objects[1].status if len(objects) > 1 else None for objects in after]
@@ -157,7 +146,7 @@ def test_a_slow_camera_has_the_same_weight_beside_a_fast_one_as_alone(rate_hz):
     """Errors of its boxes are not correlated from image to image. Only the slow one has the person in view."""
     alone, beside = Tracker(), Tracker()
     slow = [(START_NS + int(number * NS / rate_hz) + 1, shown(LEFT, around(AT_LEFT)), LEFT) for number in range(8)]
-    fast = images_of(8 / rate_hz, lambda _time_s: None, views=(FRONT,))
+    fast = images_of(8 / rate_hz, standing(), views=(FRONT,))
     play(alone, slow)
     play(beside, sorted((image for image in slow + fast if image[0] <= slow[-1][0]), key=lambda image: image[0]))
     (one,), (other,) = alone.tracks(), beside.tracks()
@@ -174,7 +163,7 @@ def test_a_person_who_stays_behind_an_object_remains_there(others):
 
     def walk(time_s):
         y_m = min(time_s - 1.5, max(0.5, time_s - 3))
-        return None if -0.2 < y_m < 1.2 else (4.0, y_m)
+        return [] if -0.2 < y_m < 1.2 else [(4.0, y_m)]
     views = (FRONT._replace(depth_at=depth_at),) + others
     published = play(Tracker(), images_of(5, walk, views=views))
     first, inside, last = (number * len(views) for number in (42, 60, 125))
@@ -228,7 +217,7 @@ def test_late_cameras_are_replayed_in_batches(monkeypatch, late_images):
     monkeypatch.setattr(Tracker, '_step', lambda *given: steps.append(None) or step(*given))
     views = [FRONT] + [looking(number, 'late %d' % number) for number in range(len(late_images))]
     lates = dict(zip([view.camera for view in views], (0,) + late_images))
-    images = images_of(2, lambda _time_s: None, views=views)
+    images = images_of(2, standing(), views=views)
     images.sort(key=lambda image: image[0] + lates[image[2].camera] * PERIOD_NS)
     play(Tracker(), images)
     assert len(steps) <= 3 * len(images)
@@ -246,18 +235,7 @@ def test_stamps_that_hardly_advance_are_rejected_until_they_do():
     tracker.update(NS + LATEST_NS + 1, [], FRONT)
 
 
-GROUP = [(IN_BOTH, 2.5), (IN_BOTH + 0.12, 3.5), (IN_BOTH - 0.1, 4.2), (IN_BOTH + 0.05, 5.5)]  # bearings, ranges
-
-
-def group_images(seconds, rate_hz, offset_m):
-    """Images of cameras that take turns at `rate_hz` each, and see the people of GROUP: the second one at offset
-    positions."""
-    random = np.random.RandomState(0)
-    for number in range(int(seconds * rate_hz) * 2):
-        time_s, view = number / (2 * rate_hz), (FRONT, LEFT)[number % 2]
-        shift_m = np.multiply(offset_m, view is LEFT)
-        places_m = [around(*person) + shift_m + random.normal(0, 0.02, 2) for person in GROUP]
-        yield START_NS + int(round(time_s * NS)), [at(*place_m) for place_m in places_m], view
+GROUP = [(IN_BOTH, 2.5), (IN_BOTH + 0.1, 3.5), (IN_BOTH - 0.1, 4.2), (IN_BOTH + 0.05, 5.5)]  # bearings, ranges
 
 
 def steps_m(published):
@@ -270,7 +248,8 @@ def steps_m(published):
 @pytest.mark.parametrize('offset_m', [(0.1, 0), (0.2, 0), (0, 0.2), (0.3, 0), (0, -0.3)])
 def test_cameras_whose_poses_disagree_do_not_move_the_frame(rate_hz, offset_m):
     tracker = Tracker()
-    published = play(tracker, group_images(4, rate_hz, offset_m))[rate_hz:]
+    published = play(tracker, images_of(4, lambda _time_s: [around(*person) for person in GROUP], rate_hz=rate_hz,
+                                        offset_m=offset_m, sigma_m=0.01))[rate_hz:]
     assert not tracker.totals.common_motions
     assert all(ids(objects) == [1, 2, 3, 4] for objects in published)
     assert max(steps_m(published)) < 0.4 * np.linalg.norm(offset_m)
@@ -279,8 +258,7 @@ def test_cameras_whose_poses_disagree_do_not_move_the_frame(rate_hz, offset_m):
 @pytest.mark.parametrize('rate_hz, nearer_m', [(5, 0.15), (7.5, 0.18), (15, 0.13), (30, 0.18)])
 def test_a_person_measured_too_near_by_opposite_cameras_stands(rate_hz, nearer_m):
     """Each box is before the track, but no outliers have moved it."""
-    opposite, random = looking(np.pi, 'opposite'), np.random.RandomState(0)
-    opposite.fixed_from_camera[0, 3] = 8.0
+    opposite, random = view_from(8, 0, camera='opposite', yaw_deg=180), np.random.RandomState(0)
     published = play(Tracker(), [
         (START_NS + int(number * NS / (2 * rate_hz)),
          [at(*random.normal((4 + (2 * (number % 2) - 1) * nearer_m, 0), 0.02), sigma=0.02)],
