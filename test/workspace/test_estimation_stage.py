@@ -98,8 +98,31 @@ def test_boxes_have_the_stamp_of_their_depth_image_which_is_used_once():
     for number in range(8):
         header = Header(stamp=time_from(1000 * NS + NS // 100 + number * NS // 30), frame_id='camera')
         source.add_boxes(boxes2d_to_msg(np.array([PERSON_PX]), header), 0)
+    source.end()
     assert [header.stamp.to_nsec() for header in headers] == depth_stamps_ns
     assert events.counts['images with a used depth image'] == 3
+
+
+@pytest.mark.parametrize('depth_hz, offset_ms, gap_ms', [(15, 0, 0), (15, 27, 7), (6, 0, 0), (6, 80, 17)])
+@pytest.mark.parametrize('latency_ms', [0, 50, 250])
+def test_a_depth_image_is_paired_with_the_nearest_colour_image(depth_hz, offset_ms, gap_ms, latency_ms):
+    """Of a camera with 30 colour images a second."""
+    pairs_ms, ms = [], NS // 1000
+    source = RgbdSource(Bbox3dParams(), EventCounter(), lambda boxes, depth, _camera: pairs_ms.append(
+        (boxes.stamp_ns // ms, depth.header.stamp.to_nsec() // ms)))
+    source.add_camera_info(CameraInfo(width=640, height=480, K=CAMERA_INFO.K), 0)
+    depth_ms = [1000 * number // depth_hz + offset_ms for number in range(2 * depth_hz - 1)]
+    color_ms = [1000 * number // 30 for number in range(60)]
+    arrivals = [(stamp_ms, stamp_ms, False) for stamp_ms in depth_ms]
+    for now_ms, stamp_ms, has_boxes in sorted(arrivals + [(ms + latency_ms, ms, True) for ms in color_ms]):
+        header = Header(stamp=time_from(1000 * NS + stamp_ms * ms), frame_id='camera')
+        if has_boxes:
+            source.add_boxes(boxes2d_to_msg(np.array([PERSON_PX]), header), now_ms * ms)
+        else:
+            source.add_depth(fill_image(Image(header=header), scene(6.0), '32FC1'), now_ms * ms)
+    source.end()
+    gaps_ms = [abs(boxes_ms - own_ms) for boxes_ms, own_ms in pairs_ms[1:]]  # of the first one, the period is unknown
+    assert len(gaps_ms) == len(depth_ms) - 1 and max(gaps_ms) <= gap_ms
 
 
 def estimate(depth_m, rects_px, events, estimator='foreground', labels=None, scores=None, **params):

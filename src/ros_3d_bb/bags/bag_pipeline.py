@@ -64,8 +64,9 @@ class BagRun(object):
             reader.check_topic(settings.name(needed, camera), *INPUTS[needed])
 
     def outputs(self):
-        """Yield (Raw, [(topic, message), ...]): each message of the bag with the messages published by the nodes."""
-        static = self._settings.name(STATIC_TOPIC)
+        """Yield (time, Raw, [(topic, message), ...]): each message of the bag with the messages published by the nodes,
+        and those at its end, with None instead of Raw."""
+        static, time = self._settings.name(STATIC_TOPIC), None
         for raw in self._reader.messages([static]):
             self._add_static(raw)
         if self._settings.camera_pose is not None:
@@ -73,12 +74,14 @@ class BagRun(object):
         self._read_depth_cameras()
         with ThreadPoolExecutor(self._settings.searches) as pool:
             for waiting in self._ahead(pool):
-                recorded_until_ns = waiting.raw.time.to_nsec() + self._ahead_ns
+                time = waiting.raw.time
+                recorded_until_ns = time.to_nsec() + self._ahead_ns
                 while self._unread_tf and self._unread_tf[0][0] <= recorded_until_ns:
                     self._transforms.add(self._unread_tf.popleft()[1])
                 self._process(waiting)
-                yield waiting.raw, self._pipeline.take_results()
+                yield time, waiting.raw, self._pipeline.take_results()
         self._pipeline.end()
+        yield time, None, self._pipeline.take_results()
 
     def _add_static(self, raw):
         with self._events.rejecting('transforms'):
@@ -196,13 +199,13 @@ def process_bag(source, target, settings=Settings()):
             if absolute(topic) not in made.union(reader.topics):
                 events.note(NOT_KEPT, 'the bag has no topic /%s; did you mean %s?'
                             % (topic, nearest_name(topic, reader.topics)))
-        for raw, outputs in run.outputs():
-            if raw.topic not in made and (settings.keep is None or raw.topic.lstrip('/') in settings.keep):
+        for time, raw, outputs in run.outputs():
+            if raw and raw.topic not in made and (settings.keep is None or raw.topic.lstrip('/') in settings.keep):
                 if types.setdefault(raw.topic, raw.md5sum) != raw.md5sum:
                     raise BagError('%s has messages of two types' % raw.topic)
                 _copy(raw, bag)
             for topic, message in outputs:
-                bag.write(settings.name(topic), message, raw.time)
+                bag.write(settings.name(topic), message, time)
     return events
 
 

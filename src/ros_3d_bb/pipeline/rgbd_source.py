@@ -8,11 +8,13 @@ from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, INFO_TOPICS, RAW
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (NEWEST, Boxes2D, boxes2d_from_msg, camera_from_msg, stamp_if_any,
                                                    stamp_of)
-from ros_3d_bb.core.time_sync import NS, StampSynchronizer
+from ros_3d_bb.core.time_sync import NS, StampSynchronizer, half_period_of
 from ros_3d_bb.pipeline.depth_registration import DepthRegistration
 
 UNSTAMPED = '2D boxes without a stamp'  # event, reported once
+USED = 'images with a used depth image'  # counter
 TILT_UNKNOWN = 'tilt of the camera unknown'  # event, reported once
+RECENT = 10  # colour images whose median period counts; chosen
 
 
 class RgbdSource(object):
@@ -37,6 +39,7 @@ class RgbdSource(object):
         self._sync = StampSynchronizer(int(cache_s * NS), int(params.stamp_tolerance * NS), int(assumed_delay_s * NS),
                                        self._on_frame, self._on_lost)
         self._on_match, self._used_ns = on_match, None
+        self._recent_ns, self._held = [], None
 
     def set_assumed_delay(self, delay_s):
         """Set the latency of the detector, for 2D boxes without a stamp."""
@@ -71,6 +74,9 @@ class RgbdSource(object):
     def end(self):
         """Report what still waits for its depth image. Call at the end of the input."""
         self._sync.end()
+        if self._held is not None:
+            self._pass_on(*self._held)
+            self._held = None
 
     def frame(self, trigger, depth_msg, camera):
         """Return the RgbdFrame of matched messages: the colour image, or the Boxes2D in it (the frame then has no
@@ -124,10 +130,23 @@ class RgbdSource(object):
 
     def _on_frame(self, trigger, depth, camera):
         """Pass matched messages on, but only once if a depth image is nearest to several colour images: positions have
-        its stamp."""
-        if depth.stamp_ns == self._used_ns and trigger.stamp_ns != depth.stamp_ns:
-            self._events.count('images with a used depth image')
-            return
+        its stamp. A colour image before it is held back if the next one should be nearer to it."""
+        gap_ns, held, self._held = depth.stamp_ns - trigger.stamp_ns, self._held, None
+        self._recent_ns = self._recent_ns[1 - RECENT:] + [trigger.stamp_ns]
+        if held is not None:
+            held_trigger, held_depth, _camera = held
+            if held_depth.stamp_ns == depth.stamp_ns and abs(gap_ns) < depth.stamp_ns - held_trigger.stamp_ns:
+                self._events.count(USED)
+            else:
+                self._pass_on(*held)
+        if gap_ns and depth.stamp_ns == self._used_ns:
+            self._events.count(USED)
+        elif gap_ns > half_period_of(self._recent_ns):
+            self._held = trigger, depth, camera
+        else:
+            self._pass_on(trigger, depth, camera)
+
+    def _pass_on(self, trigger, depth, camera):
         self._used_ns = depth.stamp_ns
         self._on_match(trigger.value, depth.value, camera)
 
