@@ -127,6 +127,25 @@ def test_two_people_side_by_side_in_both_views_are_two_tracks():
         assert np.linalg.norm(track.position_m[:2] - place_m) < 0.2
 
 
+@pytest.mark.parametrize('seconds, views, offset_m, contradicting', [
+    (7, (FRONT, LEFT), (1.0, 0.2), ('front', 'left')), (4, (FRONT, LEFT), (1.0, 0.2), None),
+    (7, (FRONT,), (0, 0), None), (7, (FRONT, LEFT), (0.2, 0.1), None)])
+def test_cameras_whose_poses_contradict_each_other(seconds, views, offset_m, contradicting):
+    """One person is two tracks for so long as both cameras see both places. Each detector misses a tenth."""
+    tracker, random = Tracker(), np.random.RandomState(0)
+    for stamp_ns, detections, view in images_of(seconds, standing(IN_BOTH), views, offsets_m={'left': offset_m}):
+        tracker.update(stamp_ns, detections if random.rand() < 0.9 else [], view)
+    assert tracker.contradicting_cameras == contradicting
+
+
+def test_people_side_by_side_whom_both_cameras_detect_are_no_contradiction():
+    tracker, places = Tracker(), [around(IN_BOTH, 2.5), around(IN_BOTH, 2.5) + (0.5, 0.5)]
+    for number, (stamp_ns, _detections, view) in enumerate(images_of(9, standing(IN_BOTH))):
+        hidden = places[view is LEFT:][:1] if number % 3 else places  # each camera detects one of them more often
+        tracker.update(stamp_ns, [found for place_m in hidden for found in shown(view, place_m)], view)
+    assert len(tracker.tracks()) == 2 and tracker.contradicting_cameras is None
+
+
 def test_a_camera_that_ends_neither_keeps_tracks_nor_delays_others():
     """Its people remain visible for one second, are then out of view for one, and then unpublished."""
     tracker = Tracker()

@@ -56,6 +56,18 @@ def test_a_backward_jump_in_time_is_handled_once(rig):
     assert rig.send(stamp_ns - 19 * NS + PERIOD_NS).header.stamp < time_from(stamp_ns)
 
 
+@pytest.mark.parametrize('apart_m, expected', [(0.2, None), (1.4, 1)])
+def test_cameras_that_contradict_each_other_are_reported_once(apart_m, expected):
+    """They show one person in two places for 7 s."""
+    rig = Rig('front', 'left')
+    for image in range(70):
+        rig.send(START_NS + image * NS // 10, 'front')
+        result = rig.send(START_NS + image * NS // 10 + NS // 20, 'left', z=3.0 + apart_m)
+    assert len(result.tracks) == (2 if expected else 1)
+    assert rig.events.counts.get('cameras that contradict each other') == expected
+    assert not expected or 'front and left' in rig.events.sentences['cameras that contradict each other']
+
+
 def test_an_optical_target_frame_is_rejected():
     """By its name when the tracker starts, by that of the boxes when they arrive."""
     with pytest.raises(ValueError, match='camera_rgb_optical_frame is an optical frame.*camera_height'):

@@ -30,6 +30,7 @@ TRACKERS = {'thesis': (ThesisTracker, [ThesisTrackerParams]),
             'kalman': (Tracker, [TrackerParams, NoiseParams, PredictionParams])}
 TRACKING_PARAMS = tuple(kind for _tracker, kinds in TRACKERS.values() for kind in kinds)
 AHEAD, BEHIND = 'images ahead of other cameras', 'images behind other cameras'  # counters
+CONTRADICTION = 'cameras that contradict each other'  # event, reported once
 NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/\w+)*$')
 
 
@@ -188,6 +189,12 @@ class TrackingStage(object):
             self._events.warn('common motion compensated', 'the people at %.3f jumped together: the pose of the camera '
                               'in %s jumped, as after an error of the odometry; all tracks are moved with them'
                               % (stamp_ns / NS, self._params.target_frame))
+        if len(self.cameras) > 1 and CONTRADICTION not in self._events.counts:
+            contradicting = self._tracker.contradicting_cameras
+            if contradicting:
+                self._events.warn(CONTRADICTION, '%s and %s each detect another one of two tracks nearby, as if they '
+                                  'showed one person in two places: check the poses of these cameras in tf'
+                                  % contradicting)
         newest_ns = self._clocks.track(stamp_ns, camera)
         self._boxes_ns[camera] = stamp_ns
         silent = self._silent_cameras(newest_ns)

@@ -4,6 +4,7 @@ The latest image of each camera classifies each undetected track, and the best r
 cannot see is therefore neither out of view nor missed while another camera detects it, sees it occluded or should
 detect it. A camera that stops sending images is ignored after a short time.
 """
+import itertools
 import math
 from typing import NamedTuple, Optional, Tuple
 
@@ -34,6 +35,8 @@ PRESENT_M = 0.3  # the same of one whose place is occupied
 STOPPING_S = 0.5  # time constant of the velocity of a person who does not come as near as predicted
 PRESENT_NS = 30 * NS  # without a detection for longer, what occupies the place may be a wall, which never leaves
 OCCLUDING_S = 0.3  # a track missed for longer does not occlude others
+# Distance of the tracks of one person in two places, and time for which each is missed by one camera; chosen.
+CONTRADICTING_M, CONTRADICTING_NS = 1.5, 5 * NS
 
 
 class CameraState(NamedTuple):
@@ -78,7 +81,7 @@ def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_p
         there = _visibilities(hidden, occluding_m, other)
         staying |= _staying([track for track in hidden if there[track.id] == VISIBLE], before, occluding_m, other)
     for track in missed:
-        track.set_visibility(camera, seen[track.id])
+        track.set_visibility(camera, seen[track.id], image.stamp_ns)
         best = min([seen[track.id]] + [track.visibility.get(name, OUT_OF_VIEW) for name in others])
         is_there = best in (PRESENT, STAYED)
         if is_there and not (track.is_confirmed and image.stamp_ns - track.last_ns <= PRESENT_NS):
@@ -92,6 +95,27 @@ def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_p
             track.state = State(*(former[:4] + _bounded(track.state, former, BEHIND_M)))
         track.miss(STATUS[best], 0.0 if is_there or best == SEEN else observed_s,
                    observed_s if best == VISIBLE else 0.0, detection_probability)
+
+
+def contradicting_cameras(tracks, stamp_ns):
+    """The names of two cameras that seem to show one person in two places, None without: for `CONTRADICTING_NS`, each
+    has one of two tracks nearby in view and does not detect it, while it detects the other one, and at most one of the
+    tracks is occluded.
+    """
+    candidates = []
+    for track in tracks:
+        detecting = set(camera for camera, seen in track.visibility.items() if seen == SEEN)
+        missing = set(camera for camera, seen in track.visibility.items()
+                      if seen in (VISIBLE, OCCLUDED) and stamp_ns - track.since_ns[camera] >= CONTRADICTING_NS)
+        if missing and track.is_confirmed and stamp_ns - track.last_ns <= RECENT_NS:
+            candidates.append((track, detecting, missing))
+    for (track, detecting, missing), (other, other_detecting, other_missing) in itertools.combinations(candidates, 2):
+        distance_m = math.hypot(track.state.x - other.state.x, track.state.y - other.state.y)
+        if distance_m < CONTRADICTING_M and track.kind.group == other.kind.group:
+            for camera, other_camera in itertools.product(detecting & other_missing, other_detecting & missing):
+                if VISIBLE in (track.visibility[other_camera], other.visibility[camera]):
+                    return tuple(sorted((camera, other_camera)))
+    return None
 
 
 def _stop(track, former, share):

@@ -124,11 +124,12 @@ class Track(object):
     extents, and `lower` and `upper` the ends of the body. `hits` counts the detections, of which `first_ns` and
     `last_ns` are the first and the latest. `unseen_s` is the time since the latest one, `missed_s` the part of it
     during which a detection was expected. `visibility` is that in the latest image of each camera: SEEN, PRESENT,
-    STAYED, or as `status`. `latest` is the `LatestBox`, `misses` counts the images before the confirmation in which a
-    detection was expected. `log_odds` is the track score. `kind` is the class of the group that has the most of the
-    filtered scores `votes`; `score` is the filtered score of the detections, `detection` the `Detection.index` in the
-    latest image. `innovation_m` is that of the latest image if its noise is assumed, otherwise 0. `slow_mps` is the
-    velocity, filtered over `SLOW_S`. `misplaced` are the log odds that outliers have moved this track.
+    STAYED, or as `status`; since the stamps `since_ns`. `latest` is the `LatestBox`, `misses` counts the images before
+    the confirmation in which a detection was expected. `log_odds` is the track score. `kind` is the class of the group
+    that has the most of the filtered scores `votes`; `score` is the filtered score of the detections, `detection` the
+    `Detection.index` in the latest image. `innovation_m` is that of the latest image if its noise is assumed, otherwise
+    0. `slow_mps` is the velocity, filtered over `SLOW_S`. `misplaced` are the log odds that outliers have moved this
+    track.
     """
 
     def __init__(self, track_id, measurement, stamp_ns, camera, speed_mps, even_log_odds):
@@ -142,7 +143,8 @@ class Track(object):
         self.lower, self.upper = (_End(0, stamp_ns) if is_cut else _End(1, NEVER_NS) for is_cut in (bottom, top))
         self.latest, self.misses = LatestBox.of(measurement), 0
         self.hits, self.first_ns, self.last_ns, self.unseen_s, self.missed_s = 1, stamp_ns, stamp_ns, 0.0, 0.0
-        self.status, self.visibility, self.innovation_m = VISIBLE, {camera: SEEN}, (0.0, 0.0)
+        self.status, self.innovation_m = VISIBLE, (0.0, 0.0)
+        self.visibility, self.since_ns = {camera: SEEN}, {camera: stamp_ns}
         self.slow_mps, self.misplaced = (0.0, 0.0), 0.0
         self.log_odds, self.is_confirmed, self.is_moving = log_odds_of(detection.score, even_log_odds), False, False
         self.votes = {measurement.kind.label: _vote(detection.score)}
@@ -155,15 +157,15 @@ class Track(object):
         track.detection = NOT_DETECTED
         return track
 
-    def set_visibility(self, camera, visibility):
+    def set_visibility(self, camera, visibility, stamp_ns):
         """Set the visibility in the latest image of a camera. Copies of this track keep the previous one."""
         if self.visibility.get(camera) != visibility:
-            self.visibility = dict(self.visibility)
-            self.visibility[camera] = visibility
+            self.visibility, self.since_ns = dict(self.visibility), dict(self.since_ns)
+            self.visibility[camera], self.since_ns[camera] = visibility, stamp_ns
 
     def update(self, measurement, stamp_ns, camera, rules):
         """Update this track, predicted to the stamp, with its measurement in the image of a camera."""
-        self.set_visibility(camera, SEEN)
+        self.set_visibility(camera, SEEN, stamp_ns)
         elapsed_s = (stamp_ns - self.last_ns) / NS
         period_s, share = elapsed_s - self.unseen_s, max(1 - math.exp(-elapsed_s / SLOW_S), 1 / self.hits)
         latest, self.latest = self.latest, LatestBox.of(measurement)

@@ -24,7 +24,7 @@ from ros_3d_bb.tracking.manoeuvres import match_manoeuvres
 from ros_3d_bb.tracking.measurement_model import (BOX_ERRORS, DEFAULT_RANGE_M, BoxNoise, Kinds, NoiseParams,
                                                   correlated_images, learned_log_scale, learned_range,
                                                   measurements_of, scaled)
-from ros_3d_bb.tracking.occlusion import CameraState, mark_missed, recent_others
+from ros_3d_bb.tracking.occlusion import CameraState, contradicting_cameras, mark_missed, recent_others
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, OutOfSequenceBuffer
 from ros_3d_bb.tracking.track import (MIN_TRACK_SCORE, SEEN, PredictionParams, Rules, Track, learned_prediction,
                                       published)
@@ -167,6 +167,11 @@ class Tracker(TrackerBase):
     def totals(self):
         """The Totals until the newest image."""
         return self._buffer.state.totals
+
+    @property
+    def contradicting_cameras(self):
+        """As of `occlusion.contradicting_cameras`."""
+        return contradicting_cameras(self._buffer.state.tracks, self._buffer.state.now_ns)
 
     def tracks(self):
         """The published tracks as TrackedObject, ordered by ID, at the stamp of the newest image; with all images."""
