@@ -79,6 +79,17 @@ def test_a_free_running_depth_camera_is_paired_by_the_nearest_image(offset_ms, d
     assert paired == [(n, n) for n in range(60) if n % 7 != 3][-len(paired):] and len(paired) >= 49
 
 
+@pytest.mark.parametrize('depth_late_ms', [-8, 0, 8])
+def test_boxes_that_arrive_before_their_depth_image_wait_for_it_with_a_long_tolerance(depth_late_ms):
+    """As of a fast detector. The stamps of one image differ by 8 ms at most, and by up to 50 ms elsewhere."""
+    recorder = Recorder(tolerance_ns=50 * MS)
+    recorder.add('camera', None, 0, 'camera')
+    for number in range(20):
+        recorder.add('boxes', number * PERIOD, number * PERIOD, number)
+        recorder.add('depth', number * PERIOD + depth_late_ms * MS, number * PERIOD + 10 * MS, number)
+    assert recorder.frames[1:] == [(n, n, 'camera') for n in range(1, 20)]
+
+
 def test_boxes_of_the_first_image_wait_until_the_period_is_known():
     recorder = Recorder(tolerance_ns=0)
     recorder.add('camera', 0, 0, 'camera')

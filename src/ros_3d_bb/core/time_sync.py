@@ -81,9 +81,13 @@ class MessageCache(object):
 
     def matching(self, stamp_ns, tolerance_ns=0):
         """The entry with this stamp, otherwise the nearest within the tolerance, or None. The tolerance 0 stands for
-        `half_period_of` the cached values."""
-        return self.nearest(stamp_ns) or self.nearest(
-            stamp_ns, tolerance_ns or half_period_of([entry.stamp_ns for entry in list(self._entries)]))
+        `half_period_ns`."""
+        return self.nearest(stamp_ns) or self.nearest(stamp_ns, tolerance_ns or self.half_period_ns)
+
+    @property
+    def half_period_ns(self):
+        """`half_period_of` the cached values."""
+        return half_period_of([entry.stamp_ns for entry in list(self._entries)])
 
     def nearest(self, stamp_ns, tolerance_ns=0):
         """The entry with the nearest stamp within the tolerance, or None."""
@@ -187,10 +191,8 @@ class StampSynchronizer(object):
             self._match_waiting(now_ns)
 
     def end(self):
-        """Give up all waiting boxes, at the end of the input."""
-        lost, self._waiting = self._waiting, []
-        for entry in lost:
-            self._on_lost(entry, False)
+        """Give up waiting, at the end of the input."""
+        self._match_waiting(NEVER)
 
     def _end_before_jump(self, start_ns):
         """Give up the boxes from before a time jump to `start_ns`. Those of the new time may have arrived first."""
@@ -209,9 +211,11 @@ class StampSynchronizer(object):
         settled, waiting = [], []
         for number, entry in enumerate(self._waiting):
             depth = self._depths.matching(entry.stamp_ns, self._tolerance_ns)
+            is_late = now_ns - entry.arrival_ns > self._length_ns
+            if depth is not None and not is_late and self._is_next_nearer(depth.stamp_ns, entry.stamp_ns):
+                depth = None
             camera = None if depth is None else self._camera_at(entry.stamp_ns)
             is_lost = depth is None and self._is_past(entry.stamp_ns)
-            is_late = now_ns - entry.arrival_ns > self._length_ns
             is_crowded = len(self._waiting) - number > MAX_WAITING
             if camera is not None or is_lost or is_late or is_crowded:
                 settled.append((entry, depth, camera))
@@ -223,6 +227,10 @@ class StampSynchronizer(object):
                 self._on_lost(boxes, False)
             else:
                 self._on_frame(boxes, depth, camera)
+
+    def _is_next_nearer(self, depth_ns, stamp_ns):
+        """Whether the depth image after the one with the stamp `depth_ns` should be nearer, and has not arrived."""
+        return depth_ns == self._depths.newest_ns and stamp_ns - depth_ns > self._depths.half_period_ns
 
     def _is_past(self, stamp_ns):
         """Whether no depth image can arrive any more for boxes with this stamp."""
