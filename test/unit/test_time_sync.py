@@ -90,6 +90,16 @@ def test_boxes_that_arrive_before_their_depth_image_wait_for_it_with_a_long_tole
     assert recorder.frames[1:] == [(n, n, 'camera') for n in range(1, 20)]
 
 
+def test_depth_images_out_of_order_lose_no_others():
+    """Every tenth one is late by one and a half periods, and the detector takes 0.3 s."""
+    recorder = Recorder(tolerance_ns=0)
+    recorder.add('camera', None, 0, 'camera')
+    arrivals = [(n * PERIOD + (PERIOD * 3 // 2 if n % 10 == 5 else 0), 'depth', n) for n in range(60)]
+    for now_ns, kind, number in sorted(arrivals + [(n * PERIOD + 300 * MS, 'boxes', n) for n in range(60)]):
+        recorder.add(kind, number * PERIOD, now_ns, number)
+    assert recorder.frames == [(n, n, 'camera') for n in range(60)] and recorder.dropped == []
+
+
 def test_boxes_of_the_first_image_wait_until_the_period_is_known():
     recorder = Recorder(tolerance_ns=0)
     recorder.add('camera', 0, 0, 'camera')

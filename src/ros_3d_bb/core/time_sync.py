@@ -65,17 +65,21 @@ class MessageCache(object):
     def add(self, stamp_ns, arrival_ns, value):
         """Add a value, or replace that of the same stamp. Returns whether time jumped back.
 
-        The stamps of a topic are in order. A stamp that goes back means that time jumped back (a bag was looped or
-        rewound); the previous values are then deleted.
+        A stamp that goes back by less than `length_ns` is that of a late message. By more, it means that time jumped
+        back (a bag was looped or rewound); the previous values are then deleted.
         """
-        went_back = self.newest_ns is not None and stamp_ns < self.newest_ns
+        went_back = self.newest_ns is not None and stamp_ns < self.newest_ns - self._length_ns
         if went_back:
             self.clear()
-        elif stamp_ns == self.newest_ns:
-            self._entries.pop()
+        later = []
+        while self._entries and self._entries[-1].stamp_ns >= stamp_ns:
+            later.append(self._entries.pop())
+        if later and later[-1].stamp_ns == stamp_ns:
+            later.pop()
         self._entries.append(Stamped(stamp_ns, arrival_ns, value))
-        self.newest_ns = stamp_ns
-        while self._entries[0].stamp_ns < stamp_ns - self._length_ns:
+        self._entries.extend(reversed(later))
+        self.newest_ns = self._entries[-1].stamp_ns
+        while self._entries[0].stamp_ns < self.newest_ns - self._length_ns:
             self._entries.popleft()
         return went_back
 
