@@ -32,7 +32,7 @@ RANGE_GAIN = 0.05  # of the filter that learns the range; chosen
 GAIN = 0.2  # change of the logarithm of the variance by a pair of innovations, relative to their correlation
 LARGEST = 3.0  # correlations are limited to this multiple of the expected squared innovation
 SETTLED_HITS = 3  # innovations of newer tracks show their unknown velocity
-MIN_LOG_SCALE, MAX_LOG_SCALE = 2 * math.log(0.05), 2 * math.log(2)  # a twentieth to twice the standard deviation
+MIN_LOG_SCALE, MAX_LOG_SCALE = 2 * math.log(0.15), 2 * math.log(2)  # of the variance, for 0.15 to 2 standard deviations
 BOX_ERRORS = 'kalman: errors of boxes (their covariance comes from the error model of bbox3d_node)'
 
 
