@@ -26,11 +26,12 @@ from ros_3d_bb.tracking.measurement_model import (BOX_ERRORS, DEFAULT_RANGE_M, B
                                                   measurements_of, scaled)
 from ros_3d_bb.tracking.occlusion import CameraState, contradicting_cameras, mark_missed, recent_others
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, OutOfSequenceBuffer
-from ros_3d_bb.tracking.track import (MIN_TRACK_SCORE, SEEN, PredictionParams, Rules, Track, learned_prediction,
-                                      published)
+from ros_3d_bb.tracking.track import (MIN_TRACK_SCORE, NEVER_NS, SEEN, PredictionParams, Rules, Track,
+                                      learned_prediction, published)
 from ros_3d_bb.tracking.types import MOVING_SPEED, VISIBLE, Totals, TrackerBase
 
 KNOWN_NS = 60 * NS  # a camera without images for longer than this, while others send images, counts as new; chosen
+MOVED, MOVING_NS = 0.001, 10 * NS  # change of the pose of a camera that moves, m and rad, and duration; chosen
 MAX_POSITION_STD_M = 2.4  # tracks whose position is less certain are dropped; chosen
 TENTATIVE_TIMEOUT_S = 0.75  # how long a tentative track is kept without a detection; chosen
 BY_ID, FIRST_SEEN = operator.attrgetter('id'), operator.attrgetter('first_ns')
@@ -88,14 +89,15 @@ class TrackerParams(NamedTuple):
 
 class _State(NamedTuple):
     """State of the tracker after an image: the tracks, the stamp of the latest image, the `CameraState` of each camera,
-    the stamp of the latest image that most people did not fit (None without), the learned
-    `measurement_model.learned_log_scale`, and the Totals.
+    the stamps of the latest image that most people did not fit (None without) and of that for which a camera moved, the
+    learned `measurement_model.learned_log_scale`, and the Totals.
     """
 
     tracks: Sequence[Track]
     now_ns: Optional[int]
     cameras: dict
     misfit_ns: Optional[int]
+    moved_ns: int
     log_noise_scale: float
     totals: Totals
 
@@ -119,7 +121,8 @@ class Tracker(TrackerBase):
         self.reconfigure(params, noise, prediction)
 
     def _start(self, last_id, log_noise_scale=0.0):
-        self._buffer = OutOfSequenceBuffer(self._step, _State([], None, {}, None, log_noise_scale, Totals()), last_id)
+        state = _State([], None, {}, None, NEVER_NS, log_noise_scale, Totals())
+        self._buffer = OutOfSequenceBuffer(self._step, state, last_id)
 
     def reconfigure(self, params, noise, prediction):
         """Change the parameters and keep the tracks. Raises ValueError without any change if one is invalid."""
@@ -195,7 +198,8 @@ class Tracker(TrackerBase):
             matches += match_manoeuvres(tracks, measurements, matches, camera.previous.stamp_ns, image.stamp_ns,
                                         self._params[0].height_sigma)
         matched = {track.id: (track.is_confirmed, measurement.number) for track, measurement in matches}
-        log_noise_scale = learned_log_scale(before.log_noise_scale, matches)
+        moved_ns = image.stamp_ns if any(abs(part) > MOVED for part in camera.change) else before.moved_ns
+        log_noise_scale = learned_log_scale(before.log_noise_scale, matches, image.stamp_ns - moved_ns < MOVING_NS)
         self._update_matched(matches, log_noise_scale - max(before.log_noise_scale, 0), image)
         cameras = self._cameras_after(before, image, camera, matches, fits)
         missed = [track for track in tracks if track.id not in matched]
@@ -211,7 +215,7 @@ class Tracker(TrackerBase):
             tracks += initiate(tracks, unmatched, image, self._params[0], self._rules, assign_id)
         misfit_ns = image.stamp_ns if fits is False else before.misfit_ns
         totals = Totals(before.totals.common_motions + is_moved, before.totals.untracked_boxes + untracked_boxes)
-        state = _State(tracks, image.stamp_ns, cameras, misfit_ns, log_noise_scale, totals)
+        state = _State(tracks, image.stamp_ns, cameras, misfit_ns, moved_ns, log_noise_scale, totals)
         return state, [(track_id,) + match for track_id, match in matched.items()]
 
     def _predict(self, before, stamp_ns):
