@@ -32,7 +32,7 @@ RANGE_GAIN = 0.05  # of the filter that learns the range; chosen
 GAIN = 0.2  # change of the logarithm of the variance by a pair of innovations, relative to their correlation
 LARGEST = 3.0  # correlations are limited to this multiple of the expected squared innovation
 SETTLED_HITS = 3  # innovations of newer tracks show their unknown velocity
-# Of the variance, for a twentieth to twice the standard deviation; for 0.15 to twice while the pose of a camera changes,
+# Of the variance, for a twentieth to twice the standard deviation; from 0.15 on while the pose of a camera changes,
 # because the corrections of a localisation last for some images.
 MIN_LOG_SCALE, MIN_MOVING_LOG_SCALE, MAX_LOG_SCALE = 2 * math.log(0.05), 2 * math.log(0.15), 2 * math.log(2)
 BOX_ERRORS = 'kalman: errors of boxes (their covariance comes from the error model of bbox3d_node)'
