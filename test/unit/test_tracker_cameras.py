@@ -133,7 +133,7 @@ def test_two_people_side_by_side_in_both_views_are_two_tracks():
 def test_cameras_whose_poses_contradict_each_other(seconds, views, offset_m, contradicting):
     """One person is two tracks for so long as both cameras see both places. Each detector misses a tenth."""
     tracker, random = Tracker(), np.random.RandomState(0)
-    for stamp_ns, detections, view in images_of(seconds, standing(IN_BOTH), views, offsets_m={'left': offset_m}):
+    for stamp_ns, detections, view in images_of(seconds, standing(IN_BOTH), views, offset_m=offset_m):
         tracker.update(stamp_ns, detections if random.rand() < 0.9 else [], view)
     assert tracker.contradicting_cameras == contradicting
 
