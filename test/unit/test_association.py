@@ -11,8 +11,8 @@ from ros_3d_bb.tracking.kalman_filter import outlier_model
 from ros_3d_bb.tracking.measurement_model import BoxNoise, Kinds, measurements_of
 from ros_3d_bb.tracking.track import Track
 from ros_3d_bb.tracking.tracker import TrackerParams
-from ros_3d_bb.tracking.types import CameraView, Detection
-from support.people import mounted
+from ros_3d_bb.tracking.types import CameraView
+from support.people import at, mounted
 
 KINDS, VIEW = Kinds(ObjectClasses()), CameraView(mounted(1.0))
 SEEDS = st.integers(0, 2 ** 32 - 1)
@@ -24,9 +24,9 @@ def measured_at(detections, images=1.0):
 
 def measured(random, count):
     """Measurements of people and chairs in an area of 4 m x 4 m, with standard deviations of 0.03 to 0.6 m."""
-    return measured_at([Detection((3 + random.uniform(-2, 2), random.uniform(-2, 2), 0.85),
-                                  (0.5, 0.5, random.uniform(1.5, 1.9)), np.eye(3) * 10 ** random.uniform(-3, -0.4),
-                                  label=random.choice(['person', 'person', 'chair'])) for _ in range(count)],
+    return measured_at([at(3 + random.uniform(-2, 2), random.uniform(-2, 2), random.uniform(1.5, 1.9),
+                           sigma=10 ** random.uniform(-1.5, -0.2), label=random.choice(['person', 'person', 'chair']))
+                        for _ in range(count)],
                        random.uniform(1, 5))
 
 
@@ -60,13 +60,13 @@ def test_crowds_have_the_same_costs(seed):
 
 def test_a_newcomer_does_not_push_a_person_to_the_track_of_another_one():
     """The person of the second track, hidden before, reappears out of its gate and within that of the first one."""
-    def at(*places):
-        return measured_at([Detection((3, y, 0.85), (0.5, 0.5, 1.7), np.eye(3) * 0.05 ** 2) for y in places])
+    def people_at(*places):
+        return measured_at([at(3, y, sigma=0.05) for y in places])
 
     params = TrackerParams()
     outliers = outlier_model(params)
     tracks = [Track(number, measurement, 0, '', 0.8, 0.0).predicted(unseen_s, 0.08)
-              for number, measurement, unseen_s in zip((1, 2), at(0.0, 0.4), (0.1, 0.3))]
-    boxes = at(0.05, -0.3)
+              for number, measurement, unseen_s in zip((1, 2), people_at(0.0, 0.4), (0.1, 0.3))]
+    boxes = people_at(0.05, -0.3)
     assert set(allowed_costs(tracks, boxes, params, outliers)[0]) == {(0, 0), (0, 1), (1, 0)}
     assert associate(tracks, boxes, 0, params, outliers) == [(tracks[0], boxes[0])]

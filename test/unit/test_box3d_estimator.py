@@ -60,11 +60,20 @@ def foreground(depth, rect, *others, camera=CAMERA):
     return estimate_foreground(depth, rects, of(camera), [PERSON_CLASS] * len(rects))[0]
 
 
-def test_depth_may_be_missing_around_raised_arms():
-    depth_mm = np.zeros((48, 64), np.uint16)
-    depth_mm[8:40, 28:36] = 4000
-    box = foreground(DepthImage(depth_mm, 0.001), (26, 8, 38, 40))
-    assert box.center_m[2] == pytest.approx(4.09, abs=0.02)
+@pytest.mark.parametrize('behind_mm,painted,rect,person_m,support', [
+    (0, [(np.s_[8:40, 28:36], 4000)], (26, 8, 38, 40), 4.0, 1),  # depth is missing around raised arms
+    (0, [(np.s_[::5, ::5], 2000)], (4, 4, 60, 44), 2.0, 1),  # of a lidar
+    (0, [(np.s_[10, 10], 3000)], (10, 10, 11, 11), 3.0, 1),
+    (0, [(np.s_[10, 10:13], [3000, 3010, 3020])], (10, 10, 13, 11), 3.01, 1),
+    # Flying pixels, the first one of which is in the layer of the person.
+    (2000, [(np.s_[:, 31:34], [2200, 3000, 4000]), (np.s_[:, 34:], 4000)], (14, 4, 50, 44), 2.0, 0.5)])
+def test_the_position_is_that_of_the_pixels_of_the_person(behind_mm, painted, rect, person_m, support):
+    depth = flat(behind_mm)
+    for area, depth_mm in painted:
+        depth.values[area] = depth_mm
+    box = foreground(depth, rect)
+    assert box.center_m[2] == pytest.approx(person_m + PERSON_CLASS.axis) and box.support == pytest.approx(support)
+    assert np.isfinite(box.center_m).all() and (box.size_m > 0).all()
 
 
 @given(st.integers(500, 5000), st.floats(0.4, 1), st.integers(400, 3000))
@@ -92,14 +101,6 @@ def test_foreground_masks_pixels_of_occluders():
     assert in_front.rect_px == near and foreground(depth, (12, 8, 30, 44), near) is None
 
 
-def test_foreground_ignores_flying_pixels():
-    depth = flat(2000)
-    depth.values[:, 30:34] = 2000, 2200, 3000, 4000  # the second one is in the layer of the person
-    depth.values[:, 34:] = 4000
-    box = foreground(depth, (14, 4, 50, 44))
-    assert box.center_m[2] == pytest.approx(2.0 + PERSON_CLASS.axis)
-
-
 def test_occluders_of_occluders_mask_pixels():
     """Three people in a row, each covering half of the next: without the nearest one, the second would be wrong."""
     depth = flat(6000)
@@ -107,23 +108,6 @@ def test_occluders_of_occluders_mask_pixels():
     rects = [(30, 4, 54, 42), (18, 4, 42, 43), (6, 4, 30, 44)]
     boxes = estimate_foreground(depth, rects, of(CAMERA), [PERSON_CLASS] * 3)
     np.testing.assert_allclose([box.center_m[2] - PERSON_CLASS.axis for box in boxes], [4, 3, 2], atol=1e-9)
-
-
-def test_sparse_depth_has_full_support():
-    """Every fifth row and column has depth, as that of a lidar in the image."""
-    depth = flat(0)
-    depth.values[::5, ::5] = 2000
-    box = foreground(depth, (4, 4, 60, 44))
-    assert box.support == 1 and box.center_m[2] == pytest.approx(2.0 + PERSON_CLASS.axis)
-
-
-@pytest.mark.parametrize('pixels', [1, 3])
-def test_a_box_of_few_pixels_has_a_position(pixels):
-    depth = flat(0)
-    depth.values[10, 10:10 + pixels] = 3000 + 10 * np.arange(pixels)
-    box = foreground(depth, (10, 10, 10 + pixels, 11))
-    assert box.center_m[2] == pytest.approx(3.0 + 0.005 * (pixels - 1) + PERSON_CLASS.axis)
-    assert np.isfinite(box.center_m).all() and (box.size_m > 0).all()
 
 
 def test_depths_beyond_any_camera_are_ignored():

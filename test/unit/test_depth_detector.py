@@ -7,10 +7,11 @@ from ros_3d_bb.camera.camera_model import Camera, transform_points
 from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.depth.detector import DepthPeople
-from ros_3d_bb.detection.depth.ground_plane import Floor, floor_from_transform
+from ros_3d_bb.detection.depth.ground_plane import Floor
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb_lab.evaluation.defaults import scenario_path
+from ros_3d_bb_lab.evaluation.scene_benchmark import depth_detector
 from ros_3d_bb_lab.simulation.scenario import read_scenario, scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
 
@@ -122,8 +123,7 @@ def test_the_box_of_a_person_with_hidden_legs_extends_to_the_floor(number):
     camera_from_map = np.linalg.inv(frame.poses.map_from_camera)
     person, = [person for person in frame.people if person.id == 4]
     feet_m = transform_points(camera_from_map, np.append(person.position_m[:2], 0))
-    boxes = DepthPeople().detect(frame.color, DepthImage(frame.depth_mm, 0.001), simulator.camera,
-                                 floor_from_transform(camera_from_map)).boxes
+    boxes = depth_detector(simulator)(frame).boxes
     overlaps = iou(person.box_px, boxes)
     assert overlaps.max() > 0.6
     assert boxes[overlaps.argmax(), 3] == pytest.approx(simulator.camera.project(feet_m[None])[0, 1], abs=3)
@@ -161,29 +161,25 @@ def test_the_last_floor_is_used_if_none_is_visible():
 
 
 def test_a_person_who_crouches_stays_detected():
-    simulator, detector = Simulator(read_scenario(scenario_path('following_robot'))), DepthPeople()
+    simulator = Simulator(read_scenario(scenario_path('following_robot')))
+    detect = depth_detector(simulator)
     for number in range(42, 58, 3):  # crouches from 43 to 49
         frame = simulator.frame(number)
-        map_from_camera = frame.poses.map_from_camera
-        found = detector.detect(frame.color, DepthImage(frame.depth_mm, 0.001), simulator.camera,
-                                floor_from_transform(np.linalg.inv(map_from_camera)))
-        x_m, _y_m, z_m = transform_points(np.linalg.inv(map_from_camera), (5.0, -2.2, 0.6))
+        x_m, _y_m, z_m = transform_points(np.linalg.inv(frame.poses.map_from_camera), (5.0, -2.2, 0.6))
         column = simulator.camera.cx + simulator.camera.fx * x_m / z_m
-        assert any(left < column < right for left, _top, right, _bottom in found.boxes.tolist()), number
+        assert any(left < column < right for left, _top, right, _bottom in detect(frame).boxes.tolist()), number
 
 
 def test_a_person_whom_someone_passes_stays_detected():
     simulator = Simulator(scenario_from({'duration': 3.0, 'rate': 10.0, 'seed': 3, 'people': [
         {'start': [3.6, 0.0], 'facing': 3.1, 'moves': [{'wait': 10.0}]},
         {'start': [2.4, 1.2], 'moves': [{'wait': 0.5}, {'to': [2.4, -1.2], 'speed': 0.8}]}]}))
-    detector, least_visible = DepthPeople(), 1.0
+    detect, least_visible = depth_detector(simulator), 1.0
     for number in range(10, simulator.frame_count):
         frame = simulator.frame(number)
-        found = detector.detect(frame.color, DepthImage(frame.depth_mm, 0.001), simulator.camera,
-                                floor_from_transform(np.linalg.inv(frame.poses.map_from_camera)))
         standing = frame.people[0]
         least_visible = min(least_visible, standing.visible)
-        assert iou(np.array(standing.box_px, float), found.boxes).max() > 0.3, (number, standing.visible)
+        assert iou(np.array(standing.box_px, float), detect(frame).boxes).max() > 0.3, (number, standing.visible)
     assert least_visible < 0.35
 
 

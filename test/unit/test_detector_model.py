@@ -10,25 +10,25 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.tracking.measurement_model import DEFAULT_RANGE_M, learned_range
 from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.types import VISIBLE, Detection
+from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb_lab.evaluation.noise import __main__ as command
 from ros_3d_bb_lab.evaluation.noise.recordings import fit_recordings, lasting_errors
 from ros_3d_bb_lab.evaluation.tracking.recorded_detections import RecordedRun
 from ros_3d_bb_lab.evaluation.tracking.run_generator import Image, RunTruth
-from support.people import VIEW, at
+from support.people import VIEW, at, play
 
-SIZE_M = np.array([0.5, 0.5, 1.7])
 PERIOD_S = 0.1
 LASTING_M, TIME_S, INDEPENDENT_M, PROBABILITY, RANGE_M = 0.06, 0.4, 0.03, 0.9, 12.0
 
 
-def run_of(people=12, images=150, seed=0):
+@pytest.fixture(scope='module')
+def run():
     """People walk around at 2 to 18 m; beyond 12 m, one of three is detected."""
-    random = np.random.RandomState(seed)
+    random, people = np.random.RandomState(0), 12
     slow_m, kept = np.zeros((people, 2)), np.exp(-PERIOD_S / TIME_S)
     starts_m, phases = np.linspace(3, 17, people), random.uniform(0, 6, people)
     taken = []
-    for number in range(images):
+    for number in range(150):
         time_s = number * PERIOD_S
         slow_m = kept * slow_m + LASTING_M * np.sqrt(1 - kept ** 2) * random.normal(size=(people, 2))
         places_m = np.stack((starts_m + np.sin(0.3 * time_s + phases), 2 * np.sin(0.5 * time_s + phases)), axis=1)
@@ -36,15 +36,10 @@ def run_of(people=12, images=150, seed=0):
         ranges_m = np.hypot(*places_m.T)
         found = random.uniform(size=people) < np.where(ranges_m < RANGE_M, PROBABILITY, 0.33)
         truth = RunTruth(np.arange(people), places_m, None, None, np.full(people, VISIBLE), None)
-        detections = [Detection(np.append(place_m, 0.85), SIZE_M) for place_m in measured_m[found]]
+        detections = [at(*place_m, covariance_m2=None) for place_m in measured_m[found]]
         stamp_ns = int(round((1 + time_s) * NS))
         taken.append(Image(stamp_ns, detections, VIEW, truth, [], stamp_ns, VIEW))
     return RecordedRun('made', tuple(taken), None)
-
-
-@pytest.fixture(scope='module')
-def run():
-    return run_of()
 
 
 def test_errors_detections_and_range_of_a_recording_are_measured(run):
@@ -92,13 +87,8 @@ def test_the_range_is_learned_from_people_farther_away():
 
 def leave(detector, distance_m):
     """A person stands there for two seconds and is then not detected. Returns how long the track is published."""
-    tracker = Tracker(detector=detector)
-    for number in range(120):
-        boxes = [at(distance_m, 0)]
-        tracks = tracker.update(NS + number * NS // 30, boxes if number < 60 else [], VIEW)
-        if number > 60 and not tracks:
-            return (number - 60) / 30.0
-    return np.inf
+    published = play(Tracker(detector=detector), 4, lambda time_s: [at(distance_m, 0)] if time_s < 2 else [])
+    return published[60:].index([]) / 30.0
 
 
 def test_detectors_that_miss_people_often_end_tracks_later():

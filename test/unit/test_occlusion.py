@@ -72,18 +72,14 @@ def test_a_person_behind_another_one_is_occluded(others, expected):
     assert place(3, 0, others=others) == expected
 
 
-@pytest.mark.parametrize('depth_mm,expected', [(1500, OCCLUDED), (3000, VISIBLE), (4500, VISIBLE), (0, VISIBLE)])
-def test_a_person_is_occluded_if_the_measured_depth_is_nearer(depth_mm, expected):
-    assert place(3, 0, with_depth(np.full((480, 640), depth_mm))) == expected
+@pytest.mark.parametrize('x,depth_mm,expected', [
+    (3, 1500, OCCLUDED), (3, 2950, VISIBLE), (3, 3000, VISIBLE), (3, 4500, VISIBLE), (3, 0, VISIBLE),
+    (0.9, 850, PRESENT), (0.6, 550, PRESENT), (0.9, 4000, VISIBLE), (0.9, 0, VISIBLE)])
+def test_depth_tells_who_is_occluded_and_who_is_too_near_to_be_detected(x, depth_mm, expected):
+    assert place(x, 0, with_depth(np.full((480, 640), depth_mm))) == expected
 
 
 def test_a_pole_before_an_arm_does_not_occlude_the_person():
     depth_mm = np.full((480, 640), 5000)
     depth_mm[:, 345:375] = 1500
     assert place(3, 0, with_depth(depth_mm)) == VISIBLE
-
-
-@pytest.mark.parametrize('x,depth_mm,expected', [
-    (0.9, 850, PRESENT), (0.6, 550, PRESENT), (0.9, 4000, VISIBLE), (0.9, 0, VISIBLE), (3, 2950, VISIBLE)])
-def test_a_person_too_near_is_expected_only_where_depth_shows_no_one(x, depth_mm, expected):
-    assert place(x, 0, with_depth(np.full((480, 640), depth_mm))) == expected

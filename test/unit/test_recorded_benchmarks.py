@@ -3,10 +3,11 @@ import json
 import numpy as np
 import pytest
 
-from ros_3d_bb.tracking.types import OUT_OF_VIEW, VISIBLE, TrackedObject
+from ros_3d_bb.tracking.types import OUT_OF_VIEW, VISIBLE
 from ros_3d_bb_lab.evaluation import __main__ as command
 from ros_3d_bb_lab.evaluation.tracking.recorded_detections import START_NS, read_recordings
 from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S
+from support.tracks import track_at
 
 CAMERA = {'width': 640, 'height': 480, 'fx': 600.0, 'fy': 600.0, 'cx': 319.5, 'cy': 239.5}
 FORWARD = '-0.5,0.5,-0.5,0.5'  # the camera looks along x of the fixed frame
@@ -29,10 +30,6 @@ def write_recording(folder, scores='0.9', ignored=''):
     for name, lines in tables.items():
         (folder / (name + '.csv')).write_text('\n'.join(lines) + '\n')
     return folder
-
-
-def track(place_m):
-    return TrackedObject(1, np.append(place_m, 1.0), np.ones(3), None, None, VISIBLE, True, 0, 0, None, 0.25)
 
 
 def test_detections_and_truth_are_in_the_fixed_frame(tmp_path):
@@ -60,7 +57,7 @@ def test_detections_and_truth_are_in_the_fixed_frame(tmp_path):
     ((12.0, 0.0), 'DontCare,nan,nan,nan,340,200,400,280', True)])
 def test_false_tracks_count_where_the_recording_is_annotated(tmp_path, place_m, ignored, is_scored):
     run, = read_recordings(str(write_recording(tmp_path / 'one', ignored=ignored)))
-    assert run.in_scored_area(run.images[0], [track(place_m)]).tolist() == [is_scored]
+    assert run.in_scored_area(run.images[0], [track_at(place_m + (1.0,), (0, 0, 0))]).tolist() == [is_scored]
     assert run.in_scored_area(run.images[0], []).tolist() == []
 
 

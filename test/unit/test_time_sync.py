@@ -168,7 +168,7 @@ def test_boxes_from_before_a_time_jump_are_dropped(recorder):
     assert recorder.add('depth', 2 * PERIOD, 9 * NS, 'two') == [] and recorder.dropped == ['boxes']
 
 
-def test_boxes_that_arrive_first_after_a_time_jump_wait_for_their_depth_image(recorder):
+def test_boxes_first_after_a_time_jump_wait_for_their_depth_image(recorder):
     recorder.add('camera', None, 0, 'camera')
     recorder.add('depth', 3600 * NS, 0, 'end')
     recorder.add('boxes', 3600 * NS, 0, 'end')

@@ -5,7 +5,6 @@ import pytest
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
-from ros_3d_bb.tracking.types import Detection
 from ros_3d_bb_lab.evaluation import __main__ as command
 from ros_3d_bb_lab.evaluation.baselines.oracle_association import outputs_with_perfect_association
 from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker
@@ -15,24 +14,17 @@ from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING
 from ros_3d_bb_lab.evaluation.tracking.run_generator import simulate
 from ros_3d_bb_lab.evaluation.tracking.trajectories import made_sequences
+from support.people import at
 
 KEYS = {'hota', 'mota', 'idf1', 'id_switches', 'fragmentations', 'position_rmse_m', 'velocity_rmse_mps', 'ade_1s_m',
         'fde_1s_m', 'ade_2s_m', 'fde_2s_m', 'coverage_95_position', 'coverage_95_velocity', 'coverage_95_1s',
         'coverage_95_2s'}
 
 
-def at(*places_m):
-    return [Detection(np.array(place_m + (0.9,)), np.array([0.5, 0.5, 1.7])) for place_m in places_m]
-
-
-def stamp(number):
-    return number * NS // 30
-
-
 def test_the_velocity_of_the_original_is_a_step_times_the_rate():
     tracker = OriginalTracker()
-    tracker.update(stamp(1), at((1.0, 0.0)))
-    person, = tracker.update(stamp(1) + NS // 100, at((1.1, 0.0)))  # 10 ms later
+    tracker.update(NS, [at(1.0, 0.0)])
+    person, = tracker.update(NS + NS // 100, [at(1.1, 0.0)])  # 10 ms later
     assert person.velocity_mps[0] == pytest.approx(0.2 * 10) and person.instant_velocity_mps[0] == pytest.approx(10)
     assert person.prediction_m[-1, 0] == pytest.approx(1.1 + 2 * 2)
 

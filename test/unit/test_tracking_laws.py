@@ -11,8 +11,8 @@ from ros_3d_bb.tracking.measurement_model import NoiseParams
 from ros_3d_bb.tracking.thesis_tracker import ThesisTracker, ThesisTrackerParams
 from ros_3d_bb.tracking.track import PredictionParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
-from ros_3d_bb.tracking.types import CameraView, Detection
-from support.people import CAMERA, START_NS, VIEW, mounted
+from ros_3d_bb.tracking.types import CameraView
+from support.people import CAMERA, START_NS, VIEW, at, ids, mounted, play
 from support.states import covariance_of
 
 PERIOD_NS = NS // 30
@@ -37,8 +37,7 @@ def test_covariances_of_tracks_are_positive_definite_whatever_boxes_come(seed):
         for _image in range(10):
             stamp_ns += int(10 ** random.uniform(-4, 2) * NS)
             places_m = random.choice([0, 1, 3, 3.01, -3], (random.randint(0, 3), 2))
-            detections = [Detection(np.append(place_m, 0.85), np.array([0.5, 0.5, 1.7]), any_covariance(random))
-                          for place_m in places_m]
+            detections = [at(*place_m, covariance_m2=any_covariance(random)) for place_m in places_m]
             view = CameraView(mounted(1.0, *random.choice([0, 45, 90, 180], 3)), CAMERA)
             tracker.update(stamp_ns, detections, view)
             for track in tracker._buffer.state.tracks:
@@ -51,9 +50,7 @@ def test_nearly_singular_covariances_do_not_stop_the_tracker(angle):
     """Messages may have a variance that rounding makes negative, of up to 1e-9 of the largest one."""
     along, tracker = np.array([np.cos(angle), np.sin(angle), 0]), Tracker()
     covariance_m2 = 1e7 * np.outer(along, along) - 0.005 * np.eye(3)
-    for number in range(30):
-        detection = Detection(np.append(3 * along[:2], 0.85), np.array([0.5, 0.5, 1.7]), covariance_m2)
-        tracker.update(START_NS + number * NS // 30, [detection], VIEW)
+    play(tracker, 1, lambda _time_s: [at(*3 * along[:2], covariance_m2=covariance_m2)])
 
 
 def ends_of_sliders():
@@ -73,9 +70,8 @@ def test_a_detected_person_keeps_one_id_at_the_ends_of_all_sliders(make, kinds, 
         if image == changed_at:
             tracker.reconfigure(*params_from(given_params, *kinds))
         x_m, y_m, height_m = (5 - 0.06 * image, 0.3 * np.sin(0.12 * image), 1.7) + random.normal(0, 0.03, 3)
-        person = Detection(np.array([x_m, y_m, height_m / 2]), np.array([0.5, 0.5, height_m]), np.eye(3) * 0.04 ** 2,
-                           score=0.97)
-        published.append([track.id for track in tracker.update(START_NS + 3 * image * PERIOD_NS, [person], VIEW)])
+        person = at(x_m, y_m, height_m, score=0.97)
+        published.append(ids(tracker.update(START_NS + 3 * image * PERIOD_NS, [person], VIEW)))
     assert published[10:] == [[1]] * 50
 
 
@@ -92,8 +88,7 @@ def test_tracks_are_the_same_anywhere_on_the_map(seed, x_m, y_m, yaw_deg):
         centers_m = np.column_stack((places_m, np.full(4, 0.85)))[random.rand(4) < 0.8]
         tracks = []
         for tracker, transform in ((near, np.eye(4)), (far, moved)):
-            detections = [Detection(center_m, np.array([0.5, 0.5, 1.7])) for center_m in
-                          transform_points(transform, centers_m)]
+            detections = [at(x, y, covariance_m2=None) for x, y, _z in transform_points(transform, centers_m)]
             view = CameraView(transform.dot(mounted(1.0)), CAMERA)
             tracks.append(tracker.update(START_NS + image * PERIOD_NS, detections, view))
         assert [track[:1] + track[5:9] for track in tracks[0]] == [track[:1] + track[5:9] for track in tracks[1]]

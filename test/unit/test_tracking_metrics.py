@@ -1,45 +1,39 @@
 import numpy as np
 import pytest
 
-from ros_3d_bb.tracking.types import VISIBLE, TrackedObject
+from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel
 from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
 from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S, Image, Run, RunTruth
+from support.tracks import STEP_S, track_at
 
 pytestmark = pytest.mark.needs('trackeval')
 IMAGES = 40
 PLACES_M = np.array([(3.0, 0.0), (4.0, 1.5)])
 VELOCITY_MPS = np.array([0.5, 0.0])
-STEP_S = 0.25
 
 
-def run_of(status=(VISIBLE, VISIBLE), images=IMAGES, future=True):
+def run_of(images=IMAGES):
     """Two walking people; the robot stands at the origin and faces along x."""
     found = []
     for number in range(images):
         places_m = PLACES_M + number / 30.0 * VELOCITY_MPS
         future_m = places_m[:, None] + HORIZONS_S[:, None] * VELOCITY_MPS
         truth = RunTruth(np.array([10, 20]), places_m, np.tile(VELOCITY_MPS, (2, 1)),
-                         future_m if future else np.full_like(future_m, np.nan), np.array(status), np.zeros(3))
+                         future_m, np.array([VISIBLE, VISIBLE]), np.zeros(3))
         found.append(Image(number, [], None, truth, [], number, None))
     return Run('made', CameraModel(), tuple(found))
 
 
-def track(track_id, place_m, velocity_mps=VELOCITY_MPS, covariances=None, steps=8, step_s=STEP_S):
-    times_s = step_s * np.arange(1, steps + 1)
-    prediction_m = np.c_[place_m + times_s[:, None] * velocity_mps, np.zeros(steps)]
-    covariance, prediction_covariance_m2 = covariances if covariances is not None else (None, None)
-    return TrackedObject(track_id, np.append(place_m, 1.0), np.ones(3), np.append(velocity_mps, 0), np.zeros(3),
-                         VISIBLE, True, 0, 0, prediction_m, step_s, covariance, prediction_covariance_m2)
-
-
-def outputs_of(run, make):
-    """Tracks `make(number of the image, truth)` of each image."""
-    return [make(number, image.truth) for number, image in enumerate(run.images)]
+def track(track_id, place_m, velocity_mps=VELOCITY_MPS, covariances=(None, None)):
+    covariance, prediction_covariance_m2 = covariances
+    return track_at(np.append(place_m, 1.0), np.append(velocity_mps, 0), covariance=covariance,
+                    number=track_id)._replace(prediction_covariance_m2=prediction_covariance_m2)
 
 
 def scores(run, make):
-    return scores_of([score_run(run, outputs_of(run, make))])
+    """Scores of the tracks `make(number of the image, truth)` of each image."""
+    return scores_of([score_run(run, [make(number, image.truth) for number, image in enumerate(run.images)])])
 
 
 def test_two_people_who_swap_ids_half_way_are_two_switches():
