@@ -46,7 +46,7 @@ def test_known_covariances_are_used_as_they_are():
 
 
 @pytest.mark.parametrize('seed', range(4))
-def test_a_standing_person_stays_still_while_the_pose_of_the_camera_is_corrected(seed):
+def test_a_standing_person_stays_still_while_the_camera_pose_is_corrected(seed):
     """Every half second, by 5 cm and 1 degree on average, as by a localisation. The boxes scatter by 3 cm."""
     tracker, random, speeds_mps = Tracker(), np.random.RandomState(seed), []
     for number in range(30 * 15):

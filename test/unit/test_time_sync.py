@@ -80,7 +80,7 @@ def test_a_free_running_depth_camera_is_paired_by_the_nearest_image(offset_ms, d
 
 
 @pytest.mark.parametrize('depth_late_ms', [-8, 0, 8])
-def test_boxes_that_arrive_before_their_depth_image_wait_for_it_with_a_long_tolerance(depth_late_ms):
+def test_boxes_before_their_depth_image_wait_for_it_with_a_long_tolerance(depth_late_ms):
     """As of a fast detector. The stamps of one image differ by 8 ms at most, and by up to 50 ms elsewhere."""
     recorder = Recorder(tolerance_ns=50 * MS)
     recorder.add('camera', None, 0, 'camera')

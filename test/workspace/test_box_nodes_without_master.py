@@ -180,7 +180,7 @@ def test_the_person_is_detected_and_drawn_at_the_stamp_of_the_image(camera, imag
 
 
 @pytest.mark.needs('torch')
-def test_the_service_pauses_and_changed_parameters_apply_from_the_next_image_on(camera, image):
+def test_the_service_pauses_and_changed_parameters_apply_to_later_images(camera, image):
     """An empty array means that no people were detected."""
     node = Yolov5Node()
     assert 'paused' in node._worker._on_request(SetBoolRequest(False)).message

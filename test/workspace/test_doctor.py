@@ -161,7 +161,7 @@ def without_map(topic, message):
 
 
 @pytest.mark.parametrize('target_frame', ['', 'odom'])
-def test_people_beside_a_robot_without_localisation_are_tracked_in_its_odometry(bag, tmp_path, target_frame):
+def test_people_near_a_robot_without_localisation_are_tracked_in_odometry(bag, tmp_path, target_frame):
     """The pose of a camera alone would not move with the robot."""
     _found, command = examined(changed(bag, tmp_path, without_map), target_frame=target_frame)
     assert '--target-frame odom' in command and '--camera' not in command

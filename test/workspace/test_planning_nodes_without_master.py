@@ -230,7 +230,7 @@ def test_only_a_goal_that_is_not_reached_is_sent_again():
     assert goals_sent(2.0, 3 * RESENT_S + 1) == 1
 
 
-def test_a_follow_node_that_is_not_enabled_is_working_when_it_receives_tracks():
+def test_a_follow_node_that_is_not_enabled_works_when_it_receives_tracks():
     with masterless() as connections:
         node, status_pub = FollowNode(), connections.publishers['/diagnostics']
         pose = ('map', 'base_link', np.eye(4))
