@@ -8,17 +8,18 @@ from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb_lab.simulation.mesh import box
 from ros_3d_bb_lab.simulation.renderer import render
 from ros_3d_bb_lab.simulation.room import FLOOR, RenderedRoom
-from support.people import view_from
+from support.people import mounted
 
 BOUNDS, HEIGHT = (-3.0, 9.0, -4.0, 4.0), 2.8
-cameras = st.sampled_from([Camera(160, 120, 153.7, 153.7, 79.8, 60.5), Camera(161, 119, 140, 150, 70, 66),
-                           Camera(99, 133, 80, 90, 49, 60)])
+CAMERA = Camera(160, 120, 153.7, 153.7, 79.8, 60.5)
+cameras = st.sampled_from([CAMERA, Camera(161, 119, 140, 150, 70, 66), Camera(99, 133, 80, 90, 49, 60)])
 
 
 def pose(position, yaw=0.0, pitch=0.0, roll=0.0):
     """Transform from the camera to the world. The camera faces x if all angles are 0."""
-    return view_from(*position, pitch_deg=np.degrees(-pitch), roll_deg=np.degrees(roll),
-                     yaw_deg=np.degrees(yaw)).fixed_from_camera
+    matrix = mounted(0.0, *np.degrees((-pitch, roll, yaw)))
+    matrix[:3, 3] = position
+    return matrix
 
 
 poses = st.builds(pose, st.tuples(st.floats(-2.5, 8.5), st.floats(-3.5, 3.5), st.floats(.1, 2.6)), st.floats(-4, 4),
@@ -28,6 +29,14 @@ poses = st.builds(pose, st.tuples(st.floats(-2.5, 8.5), st.floats(-3.5, 3.5), st
 @pytest.fixture(scope='module')
 def room():
     return RenderedRoom(BOUNDS, HEIGHT, np.random.RandomState(3))
+
+
+def crate(size, position, yaw=0.0, color=(200, 40, 40)):
+    return box(size, color, np.random.RandomState(1)).moved(position, yaw)
+
+
+def draw(room, meshes, camera=CAMERA, world_from_camera=pose((0, 0, 1.2)), shadows=()):
+    return render(room, meshes, shadows, camera, world_from_camera)
 
 
 def rays(camera, world_from_camera):
@@ -67,8 +76,7 @@ def test_depth_of_floor_ceiling_and_walls_agrees_with_ray_casting(room, world_fr
 def test_depth_of_a_box_is_that_of_rays(room, camera, x, y, yaw, size):
     """Two pixels away from its outline and edges; nearer, it need not be."""
     world_from_camera = pose((0, 0, 1.2), .05, -.1, .03)
-    crate = box(size, (200, 40, 40), np.random.RandomState(1)).moved((x, y, 0), yaw)
-    drawn = render(room, [crate], (), camera, world_from_camera)
+    drawn = draw(room, [crate(size, (x, y, 0), yaw)], camera, world_from_camera)
     c, s = np.cos(yaw), np.sin(yaw)
     into_box = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     half = np.array(size) / 2

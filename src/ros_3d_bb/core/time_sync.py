@@ -234,7 +234,8 @@ class StampSynchronizer(object):
 
     def _is_next_nearer(self, depth_ns, stamp_ns):
         """Whether the depth image after the one with the stamp `depth_ns` should be nearer, and has not arrived."""
-        return depth_ns == self._depths.newest_ns and stamp_ns - depth_ns > self._depths.half_period_ns
+        after_ns = stamp_ns - depth_ns
+        return after_ns > 0 and depth_ns == self._depths.newest_ns and after_ns > self._depths.half_period_ns
 
     def _is_past(self, stamp_ns):
         """Whether no depth image can arrive any more for boxes with this stamp."""
