@@ -5,13 +5,16 @@ import pytest
 from conftest import DATA
 from ros_3d_bb.camera.camera_model import Camera, transform_points
 from ros_3d_bb.camera.images import DepthImage
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.depth.ground_plane import Floor
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
+from ros_3d_bb.tracking.tracker import Tracker
+from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb_lab.evaluation.defaults import scenario_path
-from ros_3d_bb_lab.evaluation.scene_benchmark import depth_detector
+from ros_3d_bb_lab.evaluation.scene_benchmark import depth_detector, track_frame
 from ros_3d_bb_lab.simulation.scenario import read_scenario, scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
 
@@ -181,6 +184,18 @@ def test_a_person_whom_someone_passes_stays_detected():
         least_visible = min(least_visible, standing.visible)
         assert iou(np.array(standing.box_px, float), detect(frame).boxes).max() > 0.3, (number, standing.visible)
     assert least_visible < 0.35
+
+
+def test_a_person_half_a_metre_from_a_camera_stays_at_the_place():
+    """Only a part at the border of the image is far enough for the depth camera."""
+    simulator = Simulator(read_scenario(scenario_path('approach_high_mount')))
+    detect, tracker = depth_detector(simulator), Tracker()
+    for number in range(80, 160, 2):
+        frame = simulator.frame(number)
+        tracks = track_frame(tracker, frame, detect(frame), int(frame.time_s * NS), simulator.camera, None)
+    person = frame.people[0]
+    assert [track.id for track in tracks] == [1]
+    assert np.linalg.norm(tracks[0].position_m[:2] - person.position_m[:2]) < 0.2 and tracks[0].status == VISIBLE
 
 
 def test_furniture_in_the_place_of_a_person_is_not_detected():

@@ -106,7 +106,7 @@ class DepthPeople(object):
                 people.append(DepthDetection(box, score, position_m, hog, hog_age, sure, 0, height_m))
             elif may_continue and score >= CONTINUED_SCORE:
                 if not is_human(shape):
-                    box, position_m = _completed_part(box, shape.depth_m, last, camera, floor)
+                    box, position_m = _completed_part(box, shape, last, camera, floor)
                 people.append(last._replace(box=box, score=score, position_m=position_m, hog=hog, hog_age=hog_age,
                                             unsure=last.unsure + 1))
         people = _without_repeated(people)
@@ -162,15 +162,21 @@ def box_of(blob, shape, grid, camera, floor):
     return x1, y1, min(x2, camera.width), min(y2, camera.height)
 
 
-def _completed_part(box, depth_m, last, camera, floor):
+def _completed_part(box, shape, last, camera, floor):
     """Box and position of a person of whom only a part is visible.
 
     The height is that of the last DepthDetection, and so is the place across the view, from which the part is at most
-    half the usual width away.
+    half the usual width away. Where the image border cuts the part, the rest may be too near for the depth camera: the
+    box then has the usual width.
     """
+    half_m, depth_m = MEAN_WIDTH_M / 2, shape.depth_m
     left_m, right_m = camera.rays(np.array(box[::2]), camera.cy)[0] * depth_m
-    across_m = min(max(last.position_m[0], right_m - MEAN_WIDTH_M / 2), left_m + MEAN_WIDTH_M / 2)
-    return _extended(box, last.height_m, depth_m, camera, floor), (across_m, depth_m)
+    across_m = min(max(last.position_m[0], right_m - half_m), left_m + half_m)
+    x1, y1, x2, y2 = _extended(box, last.height_m, depth_m, camera, floor)
+    if shape.cut_side:
+        middle, half = camera.cx + across_m * camera.fx / depth_m, half_m * camera.fx / depth_m
+        x1, x2 = max(min(x1, middle - half), 0), min(max(x2, middle + half), camera.width)
+    return (x1, y1, x2, y2), (across_m, depth_m)
 
 
 def _completed(person, people, camera, floor):
