@@ -1,5 +1,6 @@
 """The pipeline on the bag of a measurement session. Needs a master and the clock of the bag."""
 import numpy as np
+import pytest
 from visualization_msgs.msg import Marker, MarkerArray
 
 from ros_3d_bb.bags.bag_writer import MOUNT_M, START_NS, session_images, write_bag
@@ -9,7 +10,8 @@ from ros_3d_bb.sessions.session_reader import read_session
 from support.ros import Recorder, launched
 
 
-def test_playback_tracks_the_person_in_the_map(session_folder, weights, tmp_path):
+@pytest.mark.parametrize('single_process', ['true', 'false'])
+def test_playback_tracks_the_person_in_the_map(single_process, session_folder, weights, tmp_path):
     """From the images of a session alone, with the detector.
 
     The person jumps every five images; then a new track is started, which is published from the fourth image on.
@@ -21,7 +23,7 @@ def test_playback_tracks_the_person_in_the_map(session_folder, weights, tmp_path
             Recorder('ros_3d_bb/tracks', TrackedObjectArray, False) as tracks, \
             Recorder('visualization_marker_array', MarkerArray, False) as markers, \
             launched('playback.launch', 'bag:=' + path, 'weights:=' + weights, 'rviz:=false', 'exit_at_end:=true',
-                     'delay:=20') as process:
+                     'delay:=20', 'single_process:=' + single_process) as process:
         process.wait()
     assert len(boxes.messages) > len(frames) / 2
     assert all(message.header.stamp.to_nsec() in frames for message in boxes.messages + tracks.messages)
