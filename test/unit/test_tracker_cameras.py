@@ -131,7 +131,7 @@ def test_two_people_side_by_side_in_both_views_are_two_tracks():
     (7, (FRONT, LEFT), (1.0, 0.2), ('front', 'left')), (4, (FRONT, LEFT), (1.0, 0.2), None),
     (7, (FRONT,), (0, 0), None), (7, (FRONT, LEFT), (0.2, 0.1), None)])
 def test_cameras_whose_poses_contradict_each_other(seconds, views, offset_m, contradicting):
-    """One person is two tracks for so long as both cameras see both places. Each detector misses a tenth."""
+    """One person is two tracks while both cameras see both places. Each detector misses a tenth."""
     tracker, random = Tracker(), np.random.RandomState(0)
     for stamp_ns, detections, view in images_of(seconds, standing(IN_BOTH), views, offset_m=offset_m):
         tracker.update(stamp_ns, detections if random.rand() < 0.9 else [], view)

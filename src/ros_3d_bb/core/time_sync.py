@@ -235,6 +235,7 @@ class StampSynchronizer(object):
     def _is_next_nearer(self, depth_ns, stamp_ns):
         """Whether the depth image after the one with the stamp `depth_ns` should be nearer, and has not arrived."""
         after_ns = stamp_ns - depth_ns
+        # The first comparison saves the median of the periods where stamps are equal, as of most cameras.
         return after_ns > 0 and depth_ns == self._depths.newest_ns and after_ns > self._depths.half_period_ns
 
     def _is_past(self, stamp_ns):

@@ -141,7 +141,7 @@ class RgbdSource(object):
                 self._pass_on(*held)
         if gap_ns and depth.stamp_ns == self._used_ns:
             self._events.count(USED)
-        elif gap_ns > 0 and gap_ns > half_period_of(self._recent_ns):
+        elif gap_ns > 0 and gap_ns > half_period_of(self._recent_ns):  # no median where stamps are equal
             self._held = trigger, depth, camera
         else:
             self._pass_on(trigger, depth, camera)

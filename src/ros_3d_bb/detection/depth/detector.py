@@ -19,8 +19,9 @@ MEAN_HEIGHT_M, MEAN_WIDTH_M = 1.7, 0.5  # assumed for people who are partly outs
 SURE_SCORE = 0.95  # no further HOG scores are evaluated from this score on
 MAX_HOG_AGE = 2  # number of further images for which the HOG score of a person is used
 # Hysteresis, as of the thresholds of Canny (1986): a person who was sure in so many images continues with a lower
-# score, as one who crouches or is partly hidden, for a number of images, of which one without the person, whom nobody
-# hides, counts as several. Chosen: furniture has lower scores or is seldom sure; 75 images are 5 s of the demo.
+# score, as one who crouches or is partly hidden, for a number of images. An image without the person counts as several
+# unless someone else hides the person. Chosen: furniture has lower scores or is seldom sure; 75 images are 5 s of the
+# demo.
 LEAST_SURE, CONTINUED_SCORE, MAX_UNSURE, NOT_FOUND = 3, 0.1, 75, 15
 NEARER_M, HIDDEN_SHARE = 0.3, 0.5  # of a person who hides the legs of another one, and of the width of these; chosen
 MIN_DISTANCE_M = 0.35  # between the centres of two people; closer detections are one person
