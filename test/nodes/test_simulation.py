@@ -50,7 +50,7 @@ def test_all_people_are_tracked_until_the_end_of_the_scene(tmp_path):
         boxes = [box for _topic, message, _time in bag.read_messages(['/ros_3d_bb/bb_3d']) for box in message.boxes]
     assert result.images > 30 and [person.person for person in result.people] == [1, 2]
     for person in result.people:
-        assert len(person.ids) == 1 and person.followed > 0.6 and person.rmse_m < 0.25, person
+        assert len(person.ids) == 1 and person.detected > 0.6 and person.rmse_m < 0.25, person
     assert result.false_share < 0.1
     assert {'/camera/color/image_raw', '/camera/aligned_depth_to_color/image_raw', '/camera/color/camera_info', '/tf',
             '/ground_truth', '/yolo_bounding_box', '/ros_3d_bb/bb_3d', '/ros_3d_bb/tracks',

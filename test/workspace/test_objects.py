@@ -35,7 +35,7 @@ def test_each_object_is_one_track_with_its_label(run):
     assert sorted(label for _id, label in published) == LABELS  # one track each, whose label never changes
     for found in scores.people:
         assert (found.ids[0], labels[found.person]) in published and len(found.ids) == 1
-        assert found.followed > 0.95 and found.rmse_m <= 0.08, labels[found.person]
+        assert found.detected > 0.95 and found.rmse_m <= 0.08, labels[found.person]
 
 
 def test_tracks_name_the_box_that_they_were_detected_as(run):

@@ -3,7 +3,8 @@
 In each image, people and tracks within `GATE_M` in the horizontal plane are matched as in TrackEval's CLEAR metric
 (Bernardin and Stiefelhagen 2008): matches of the previous image are kept, then as many others as possible are added
 with the least sum of distances. TrackEval itself is not required, because it need not be installed on a robot. An ID
-switch is a match with a track other than the last one. Only people and tracks with the status VISIBLE are scored.
+switch is a match with a track other than the last one. Only people and tracks with the status VISIBLE are matched. A
+person who is not matched, such as behind another one, is tracked as long as the last track is published nearby.
 """
 from typing import List, NamedTuple
 
@@ -29,14 +30,15 @@ class Moment(NamedTuple):
 class PersonScore(NamedTuple):
     """Tracking scores of one person.
 
-    `visible_s` is the total time in view; `followed` is the share 0..1 of the images with the person visible that have
-    a matched track; `ids` has an entry for each change of the track ID; `rmse_m` and `worst_m` are position errors of
+    `visible_s` is the total time in view; `detected` and `tracked` are the shares 0..1 of the images with the person
+    visible that have a matched track, and that have a track of any status within `GATE_M`; `ids` has an entry for each change of the track ID; `rmse_m` and `worst_m` are position errors of
     the matched tracks, NaN if there are none.
     """
 
     person: int
     visible_s: float
-    followed: float
+    detected: float
+    tracked: float
     ids: List[int]
     rmse_m: float
     worst_m: float
@@ -91,20 +93,28 @@ class ClearMatcher(object):
 
 
 def _person_score(person_id, moments, matches, cameras):
-    ids, errors_m, visible_ns = [], [], []
+    ids, errors_m, visible_ns, tracked = [], [], [], 0
     for moment, pairs in zip(moments, matches):
-        if not any(person.id == person_id and person.status == VISIBLE for person in moment.truth):
+        visible = [person for person in moment.truth if person.id == person_id and person.status == VISIBLE]
+        if not visible:
             continue
         visible_ns.append(moment.stamp_ns)
         for person, track in pairs:
             if person.id == person_id:
-                errors_m.append(np.linalg.norm((track.position_m - person.position_m)[:2]))
+                errors_m.append(_distance_m(track, person))
                 if ids[-1:] != [track.id]:
                     ids.append(track.id)
+        tracked += any(track.id in ids[-1:] and _distance_m(track, visible[0]) <= GATE_M for track in moment.tracks)
     visible_s = _visible_s(visible_ns, [moment.stamp_ns for moment in moments], cameras)
-    return PersonScore(person_id, visible_s, len(errors_m) / float(max(1, len(visible_ns))), ids,
+    images = float(max(1, len(visible_ns)))
+    return PersonScore(person_id, visible_s, len(errors_m) / images, tracked / images, ids,
                        float(np.sqrt(np.mean(np.square(errors_m)))) if errors_m else float('nan'),
                        max(errors_m, default=float('nan')))
+
+
+def _distance_m(track, person):
+    """Distance in the plane."""
+    return np.linalg.norm((track.position_m - person.position_m)[:2])
 
 
 def _visible_s(visible_ns, all_ns, cameras):
@@ -115,8 +125,8 @@ def _visible_s(visible_ns, all_ns, cameras):
 
 def table_of_people(scene_score):
     """Format the scores as a table of text: a header and rows, and a sentence on all images."""
-    rows = [('%d' % person.person, '%.1f s' % person.visible_s, '%.0f %%' % (100 * person.followed),
-             '%d' % person.switches, ' '.join(map(str, person.ids)) or '-', '%.3f m' % person.rmse_m,
+    rows = [('%d' % person.person, '%.1f s' % person.visible_s, '%.0f %%' % (100 * person.detected),
+             '%.0f %%' % (100 * person.tracked), '%d' % person.switches, ' '.join(map(str, person.ids)) or '-', '%.3f m' % person.rmse_m,
              '%.3f m' % person.worst_m) for person in scene_score.people]
-    return (('person', 'visible', 'tracked', 'ID switches', 'track IDs', 'RMSE', 'worst'), rows,
+    return (('person', 'visible', 'detected', 'tracked', 'ID switches', 'track IDs', 'RMSE', 'worst'), rows,
             '%d images, %.3f false tracks per image' % (scene_score.images, scene_score.false_share))

@@ -36,8 +36,9 @@ CSV_COLUMNS = ('stamp_s', 'id', 'label', 'status', 'x_m', 'y_m', 'vx_mps', 'vy_m
 TRUTH_COLOR, ROBOT_COLOR = '#aaaaaa', '#141414'
 LEGEND = ('Map: the colours are visible tracks with their IDs, grey are the true paths of people, black is the robot. '
           'A track ID is not the number of a person: it only has to stay the same. ')
-TRUTH_LEGEND = ('Table: for each person, how long the person was in view, the share of this time with a track, the '
-                'changes of the track ID, the IDs, and the position error, RMS and largest. ')
+TRUTH_LEGEND = ('Table: for each person, how long the person was in view, the shares of this time with a visible track '
+                'and with a track of any status, the changes of the track ID, the IDs, and the position error of '
+                'visible tracks, RMS and largest. ')
 SEE_ALSO = 'The pages Bags and Troubleshooting of the documentation, and rosrun ros_3d_bb doctor BAG, help further.'
 
 

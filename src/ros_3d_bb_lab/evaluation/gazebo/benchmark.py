@@ -102,13 +102,13 @@ def moments_in(scene_bag, tracks_bag, start_ns):
 
 
 def result_of(moments):
-    """Scores of a tracker in a scene as a dictionary: lengths in metres, the rate in Hz, `tracked` a share 0..1."""
+    """Scores of a tracker in a scene as a dictionary: lengths in metres, the rate in Hz, `detected` a share 0..1."""
     tracked = score(moments)
-    errors_m = [(person.rmse_m, person.followed * person.visible_s) for person in tracked.people if person.ids]
+    errors_m = [(person.rmse_m, person.detected * person.visible_s) for person in tracked.people if person.ids]
     seconds = (moments[-1].stamp_ns - moments[0].stamp_ns) / NS
     result = {'images': len(moments), 'rate_hz': (len(moments) - 1) / seconds,
-              'tracked': float(np.average([person.followed for person in tracked.people],
-                                          weights=[person.visible_s for person in tracked.people])),
+              'detected': float(np.average([person.detected for person in tracked.people],
+                                           weights=[person.visible_s for person in tracked.people])),
               'id_switches': sum(person.switches for person in tracked.people),
               'false_share': tracked.false_share,
               'rmse_m': float(np.sqrt(np.average([rmse_m ** 2 for rmse_m, _weight in errors_m],
