@@ -9,10 +9,12 @@ from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
 from support.people import START_NS, VIEW, all_ids, at, ids, noisy, play, standing, view_from
 
 
-@pytest.mark.parametrize('rate_hz', [3, 5, 10, 20, 30, 60])
-def test_tracks_begin_and_end_after_the_same_time_at_any_rate(rate_hz):
-    """Boxes without a score. Below 15 Hz, the second one confirms the track."""
-    walk = play(Tracker(), 4, lambda time_s: [at(3, 0)] if time_s < 2 else [], rate_hz)
+@pytest.mark.parametrize('speed_mps', [0, 1.6])
+@pytest.mark.parametrize('rate_hz', [3, 4, 5, 10, 20, 30, 60])
+def test_tracks_begin_and_end_after_the_same_time_at_any_rate(rate_hz, speed_mps):
+    """Boxes without a score, of a person who stands or comes nearer. Below 15 Hz, the second one confirms the track.
+    """
+    walk = play(Tracker(), 4, lambda time_s: [at(6 - speed_mps * time_s, 0)] if time_s < 2 else [], rate_hz)
     published_s = [number / rate_hz for number, objects in enumerate(walk) if objects]
     assert 0.06 <= published_s[0] <= max(0.11, 1.01 / rate_hz)
     assert 2.15 <= published_s[-1] <= max(2.45, 2 + 2.01 / rate_hz)

@@ -68,18 +68,18 @@ def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_p
     which accounts for `observed_s` seconds. `detection_probability` is that of a visible person.
     """
     before = {track.id: track for track in before}
-    occluding_m = _positions_of([track for track in tracks if track.is_confirmed and track.missed_s < OCCLUDING_S])
+    occluding = [track for track in tracks if track.is_confirmed and track.missed_s < OCCLUDING_S]
     image, others = cameras[camera], recent_others(cameras, camera, cameras[camera].stamp_ns)
-    seen = _visibilities(missed, occluding_m, image)
+    seen = _visibilities(missed, occluding, image)
     staying = _staying([track for track in missed if track.status == OCCLUDED and seen[track.id] == VISIBLE], before,
-                       occluding_m, image)
+                       occluding, image)
     seen.update(dict.fromkeys(staying, OCCLUDED))
     for name, other in others.items():
         # The person may also stay behind what occludes the view of another camera.
         hidden = [track for track in missed if track.status == track.visibility.get(name) == OCCLUDED
                   and seen[track.id] != VISIBLE]
-        there = _visibilities(hidden, occluding_m, other)
-        staying |= _staying([track for track in hidden if there[track.id] == VISIBLE], before, occluding_m, other)
+        there = _visibilities(hidden, occluding, other)
+        staying |= _staying([track for track in hidden if there[track.id] == VISIBLE], before, occluding, other)
     for track in missed:
         track.set_visibility(camera, seen[track.id], image.stamp_ns)
         best = min([seen[track.id]] + [track.visibility.get(name, OUT_OF_VIEW) for name in others])
@@ -126,19 +126,19 @@ def _stop(track, former, share):
                         *_bounded(track.state, former, PRESENT_M))
 
 
-def _visibilities(tracks, occluding_m, image):
+def _visibilities(tracks, occluding, image):
     """The visibility {ID: PRESENT, STAYED, VISIBLE, OCCLUDED or OUT_OF_VIEW} of tracks in the view of a CameraState."""
     if not tracks:
         return {}
     visibility = classify_visibility(image.view, _positions_of(tracks), np.array([track.size_m for track in tracks]),
-                                     occluding_m, image.range_m)
+                                     _positions_of(occluding), image.range_m)
     return dict(zip([track.id for track in tracks], visibility.tolist()))
 
 
-def _staying(tracks, before, occluding_m, image):
-    """The IDs of the tracks whose previous position is occluded in the view of a CameraState."""
-    visibility = _visibilities([before[track.id] for track in tracks], occluding_m, image)
-    return set(track_id for track_id, seen in visibility.items() if seen == OCCLUDED)
+def _staying(tracks, before, occluding, image):
+    """The IDs of the tracks whose previous position something else occludes in the view of a CameraState."""
+    return set(track.id for track in tracks if OCCLUDED in _visibilities(
+        [before[track.id]], [other for other in occluding if other.id != track.id], image).values())
 
 
 def _bounded(predicted, former, most_m):
