@@ -74,7 +74,7 @@ def test_a_person_behind_another_one_is_occluded(others, expected):
 
 @pytest.mark.parametrize('x,depth_mm,expected', [
     (3, 1500, OCCLUDED), (3, 2950, VISIBLE), (3, 3000, VISIBLE), (3, 4500, VISIBLE), (3, 0, VISIBLE),
-    (0.9, 850, PRESENT), (0.6, 550, PRESENT), (0.9, 4000, VISIBLE), (0.9, 0, VISIBLE)])
+    (0.9, 850, PRESENT), (0.6, 550, PRESENT), (0.9, 4000, VISIBLE), (0.9, 0, OUT_OF_VIEW)])
 def test_depth_tells_who_is_occluded_and_who_is_too_near_to_be_detected(x, depth_mm, expected):
     assert place(x, 0, with_depth(np.full((480, 640), depth_mm))) == expected
 

@@ -59,6 +59,24 @@ def test_a_person_out_of_view_is_published_while_certain():
 PILLAR = VIEW._replace(depth_at=lambda points: np.where(np.abs(points[:, 0]) < 0.1 * points[:, 2], 2.0, 6.0))
 
 
+@pytest.mark.parametrize('rate_hz', [5, 10, 30])
+@pytest.mark.parametrize('speed_mps', [0.6, 1.5])
+def test_a_person_who_comes_too_near_for_the_camera_stays_before_it(speed_mps, rate_hz):
+    """Depth cameras measure nothing nearer than 0.3 to 0.8 m."""
+    tracker, nearest_s = Tracker(), 2.3 / speed_mps
+    blind = VIEW._replace(depth_at=lambda points: np.full(len(points), np.nan))
+    for objects in play(tracker, nearest_s + 3, lambda time_s: [at(3 - speed_mps * time_s, 0)] if time_s < nearest_s
+                        else [], rate_hz, view=blind)[-3 * rate_hz:]:
+        assert ids(objects) == [1] and 0.3 < objects[0].position_m[0] < 0.9
+    assert np.linalg.norm(objects[0].velocity_mps) < 0.1
+
+
+def test_a_person_who_passes_the_camera_goes_on_behind_it():
+    tracker = Tracker()
+    play(tracker, 2, lambda time_s: [at(2.5 - time_s, 0.35)])
+    assert play(tracker, 1, lambda time_s: [], start_s=2)[-1][0].position_m[0] < -0.3
+
+
 @pytest.mark.parametrize('view,speed_mps,away_s,max_age,expected', [
     (VIEW, 0, 2.9, 4.0, 1), (VIEW, 0, 3.5, 15.0, 2),  # the position is too uncertain after 3 s
     (VIEW, 0, 1.5, 1.0, 2), (PILLAR, 0.6, 6, 4.0, 2), (PILLAR, 0.6, 6, 15.0, 1)])

@@ -18,6 +18,7 @@ from ros_3d_bb.tracking.types import NEARER_M, OCCLUDED, OUT_OF_VIEW, VISIBLE, C
 # All are chosen; `./run bench scenes` and `./run bench tracking` show the effect of others.
 EDGE_RAD = 0.04  # people this close to the image border are not detected reliably
 NEAREST_M = 0.45  # neither are people this close to the camera
+BLIND_M = 1.0  # most depth cameras measure nothing nearer than 0.3 to 0.8 m; the axis of a body is behind its surface
 LEAST_IN_IMAGE = 0.2  # minimum share of the body axis inside the image for a person to be detected
 RELIABLE_IN_IMAGE = 0.5  # detectors often fail if less of the body axis is in the image
 AXIS_SAMPLES = np.linspace(-0.48, 0.48, 11)  # samples of the body axis, as fractions of the height from the centre
@@ -61,7 +62,8 @@ def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_p
 
     An occluded person who is predicted to reappear but is not detected is assumed to stay behind the occluder: the
     track keeps its previous position. A person whose place is occupied does not become less certain than `PRESENT_M`,
-    until `PRESENT_NS` after the latest detection, and does not come nearer than what occupies it.
+    until `PRESENT_NS` after the latest detection, and does not come nearer than what occupies it. A person who walks up
+    to a camera stops before it, as people do in front of a robot.
 
     `missed` are those of the `tracks` that are not detected; they are predicted to the stamp of the image. `before` are
     the tracks after the previous image. `cameras` maps each camera to its CameraState; `camera` is that of the image,
@@ -80,6 +82,7 @@ def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_p
                   and seen[track.id] != VISIBLE]
         there = _visibilities(hidden, occluding, other)
         staying |= _staying([track for track in hidden if there[track.id] == VISIBLE], before, occluding, other)
+    views = [image.view] + [other.view for other in others.values()]
     for track in missed:
         track.set_visibility(camera, seen[track.id], image.stamp_ns)
         best = min([seen[track.id]] + [track.visibility.get(name, OUT_OF_VIEW) for name in others])
@@ -93,6 +96,8 @@ def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_p
         elif best == OCCLUDED and track.id in staying:  # at the previous position
             former = before[track.id].state
             track.state = State(*(former[:4] + _bounded(track.state, former, BEHIND_M)))
+        elif best == OUT_OF_VIEW and any(_meets(track, before[track.id].state, view) for view in views):
+            _stop(track, before[track.id].state, math.exp(-observed_s / STOPPING_S))
         track.miss(STATUS[best], 0.0 if is_there or best == SEEN else observed_s,
                    observed_s if best == VISIBLE else 0.0, detection_probability)
 
@@ -116,6 +121,17 @@ def contradicting_cameras(tracks, stamp_ns):
                 if VISIBLE in (track.visibility[other_camera], other.visibility[camera]):
                     return tuple(sorted((camera, other_camera)))
     return None
+
+
+def _meets(track, former, view):
+    """Whether a track would pass through a camera at the height of the body, or come nearer than `NEAREST_M`, given its
+    former State."""
+    camera_x, camera_y, camera_z = view.fixed_from_camera[:3, 3].tolist()
+    u, v, speed_mps = former.u, former.v, math.hypot(former.u, former.v)
+    to_x, to_y = camera_x - former.x, camera_y - former.y
+    is_ahead = to_x * u + to_y * v > 0 and abs(to_x * v - to_y * u) < BODY_RADIUS_M * speed_mps
+    is_near = (camera_x - track.state.x) * u + (camera_y - track.state.y) * v < NEAREST_M * speed_mps
+    return is_ahead and is_near and abs(camera_z - track.z_m) < track.size_m[2] / 2
 
 
 def _stop(track, former, share):
@@ -155,7 +171,8 @@ def classify_visibility(view, positions_m, sizes_m, others_m, max_range_m):
     """Classify the visibility (n,) of people with centres and extents (n, 3) in a CameraView.
 
     VISIBLE: a detection is expected. OCCLUDED: by a person at one of the centres `others_m` (m, 3), which may contain
-    the people themselves, or by something nearer in the depth image. OUT_OF_VIEW: also beyond the detector's range.
+    the people themselves, or by something nearer in the depth image. OUT_OF_VIEW: also beyond the detector's range, and
+    nearer than `BLIND_M` where no depth is measured.
     PRESENT: with so little of the body in the image that detectors often miss it, while its place is occupied in the
     depth image. STAYED: the same, and what occupies it is farther than the axis of the body.
     """
@@ -167,8 +184,9 @@ def classify_visibility(view, positions_m, sizes_m, others_m, max_range_m):
     visibility[out_of_range | (shares < LEAST_IN_IMAGE)] = OUT_OF_VIEW
     undecided = np.flatnonzero((visibility != OCCLUDED) & ~out_of_range & (shares > 0))
     if view.depth_at is not None and len(undecided):
-        hidden, present, farther = _in_depth(view, positions_m[undecided], sizes_m[undecided])
+        hidden, present, farther, unknown = _in_depth(view, positions_m[undecided], sizes_m[undecided])
         visibility[undecided[hidden & (visibility[undecided] == VISIBLE)]] = OCCLUDED
+        visibility[undecided[unknown & (distances_m[undecided] < BLIND_M)]] = OUT_OF_VIEW
         present &= shares[undecided] < RELIABLE_IN_IMAGE
         visibility[undecided[present]] = PRESENT
         visibility[undecided[present & farther]] = STAYED
@@ -242,8 +260,9 @@ def _half_widths(distances_m):
 
 
 def _in_depth(view, positions_m, sizes_m):
-    """People occluded by objects, people who are there, and those who are farther than their axis, (n,) bool each: most
-    of the depth measured towards the body is clearly nearer, or that of something at its distance, or farther.
+    """People occluded by objects, people who are there, those who are farther than their axis, and those of whom nothing
+    is known, (n,) bool each: most of the depth measured towards the body is clearly nearer, or that of something at its
+    distance, or farther; or none is measured.
     """
     rotation = view.fixed_from_camera[:3, :3]  # its inverse is its transpose
     centers = (positions_m - view.fixed_from_camera[:3, 3]).dot(rotation)
@@ -257,4 +276,4 @@ def _in_depth(view, positions_m, sizes_m):
     with np.errstate(invalid='ignore'):  # nan is neither
         each = behind_m > HIDDEN_BEHIND_M, np.abs(behind_m) <= HIDDEN_BEHIND_M, behind_m < 0
     counts = np.maximum(known.sum(axis=1), ACROSS.size / 3.0)
-    return [some.sum(axis=1) > HIDDEN_SHARE * counts for some in each]
+    return [some.sum(axis=1) > HIDDEN_SHARE * counts for some in each] + [~known.any(axis=1)]
