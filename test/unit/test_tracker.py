@@ -71,10 +71,13 @@ def test_a_person_who_comes_too_near_for_the_camera_stays_before_it(speed_mps, r
     assert np.linalg.norm(objects[0].velocity_mps) < 0.1
 
 
-def test_a_person_who_passes_the_camera_goes_on_behind_it():
-    tracker = Tracker()
-    play(tracker, 2, lambda time_s: [at(2.5 - time_s, 0.35)])
-    assert play(tracker, 1, lambda time_s: [], start_s=2)[-1][0].position_m[0] < -0.3
+@pytest.mark.parametrize('beside_m,depth_m', [(0.35, np.nan), (0.0, 4.0)])
+def test_a_person_who_has_passed_the_camera_goes_on_behind_it(beside_m, depth_m):
+    """Beside it, or the depth image shows the wall behind the place of the person."""
+    tracker, view = Tracker(), VIEW._replace(depth_at=lambda points: np.full(len(points), depth_m))
+    walk = play(tracker, 3, lambda time_s: [at(2.5 - time_s, beside_m)] if time_s < 2 else [], view=view)
+    last, = [objects[0] for objects in walk if objects][-1:]
+    assert last.position_m[0] < 0.3
 
 
 @pytest.mark.parametrize('view,speed_mps,away_s,max_age,expected', [

@@ -124,14 +124,20 @@ def contradicting_cameras(tracks, stamp_ns):
 
 
 def _meets(track, former, view):
-    """Whether a track would pass through a camera at the height of the body, or come nearer than `NEAREST_M`, given its
-    former State."""
+    """Whether someone who walks would pass through a camera at the height of the body, or come nearer than `NEAREST_M`,
+    and the depth image does not show that nobody is at the place of the former State."""
+    if view.depth_at is None or not track.is_moving:
+        return False
     camera_x, camera_y, camera_z = view.fixed_from_camera[:3, 3].tolist()
     u, v, speed_mps = former.u, former.v, math.hypot(former.u, former.v)
     to_x, to_y = camera_x - former.x, camera_y - former.y
     is_ahead = to_x * u + to_y * v > 0 and abs(to_x * v - to_y * u) < BODY_RADIUS_M * speed_mps
     is_near = (camera_x - track.state.x) * u + (camera_y - track.state.y) * v < NEAREST_M * speed_mps
-    return is_ahead and is_near and abs(camera_z - track.z_m) < track.size_m[2] / 2
+    if not (is_ahead and is_near and abs(camera_z - track.z_m) < track.size_m[2] / 2):
+        return False
+    _hidden, (present,), _farther, (unknown,) = _in_depth(view, np.array([[former.x, former.y, track.z_m]]),
+                                                          np.array([track.size_m]))
+    return present or unknown
 
 
 def _stop(track, former, share):
