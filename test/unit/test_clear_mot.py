@@ -53,7 +53,7 @@ ONE, HIDDEN, TRACK = at(1, 0, 0), at(1, 0, 0, OCCLUDED), at(5, 0, 0)
     ([([ONE], [TRACK]), ([HIDDEN], []), ([HIDDEN], [at(6, 0.5, 0)]), ([ONE], [TRACK])], 1, 1),  # only visible people
     ([([ONE], [TRACK]), ([at(1, 0.2, 0)], [at(5, 0, 0, OCCLUDED)])], 1 / 2, 1),  # the track of a person who is hidden
     ([([ONE], [TRACK]), ([ONE], [at(5, 2, 0, OCCLUDED), at(6, 0, 0, OCCLUDED)])], 1 / 2, 1 / 2),  # no track nearby
-    ([([ONE], [TRACK]), ([ONE], []), ([ONE], [at(5, 0.4, 0), at(6, 0.1, 0)])], 2 / 3, 2 / 3)])  # a kept match after a gap
+    ([([ONE], [TRACK]), ([ONE], []), ([ONE], [at(5, 0.4, 0), at(6, 0.1, 0)])], 2 / 3, 2 / 3)])  # a match kept
 def test_only_visible_people_and_tracks_are_matched(images, detected, tracked):
     person, = score(moments(*images)).people
     assert person.ids == [5] and (person.detected, person.tracked) == pytest.approx((detected, tracked))

@@ -31,8 +31,9 @@ class PersonScore(NamedTuple):
     """Tracking scores of one person.
 
     `visible_s` is the total time in view; `detected` and `tracked` are the shares 0..1 of the images with the person
-    visible that have a matched track, and that have a track of any status within `GATE_M`; `ids` has an entry for each change of the track ID; `rmse_m` and `worst_m` are position errors of
-    the matched tracks, NaN if there are none.
+    visible that have a matched track, and that have the last one within `GATE_M`, whatever its status; `ids` has an
+    entry for each change of the track ID; `rmse_m` and `worst_m` are position errors of the matched tracks, NaN if
+    there are none.
     """
 
     person: int
@@ -126,7 +127,7 @@ def _visible_s(visible_ns, all_ns, cameras):
 def table_of_people(scene_score):
     """Format the scores as a table of text: a header and rows, and a sentence on all images."""
     rows = [('%d' % person.person, '%.1f s' % person.visible_s, '%.0f %%' % (100 * person.detected),
-             '%.0f %%' % (100 * person.tracked), '%d' % person.switches, ' '.join(map(str, person.ids)) or '-', '%.3f m' % person.rmse_m,
-             '%.3f m' % person.worst_m) for person in scene_score.people]
+             '%.0f %%' % (100 * person.tracked), '%d' % person.switches, ' '.join(map(str, person.ids)) or '-',
+             '%.3f m' % person.rmse_m, '%.3f m' % person.worst_m) for person in scene_score.people]
     return (('person', 'visible', 'detected', 'tracked', 'ID switches', 'track IDs', 'RMSE', 'worst'), rows,
             '%d images, %.3f false tracks per image' % (scene_score.images, scene_score.false_share))
