@@ -266,9 +266,9 @@ def _half_widths(distances_m):
 
 
 def _in_depth(view, positions_m, sizes_m):
-    """People occluded by objects, people who are there, those who are farther than their axis, and those of whom nothing
-    is known, (n,) bool each: most of the depth measured towards the body is clearly nearer, or that of something at its
-    distance, or farther; or none is measured.
+    """People occluded by objects, people who are there, those who are farther than their axis, and those without depth,
+    (n,) bool each: most of the depth measured towards the body is clearly nearer, or that of something at its distance,
+    or farther; or none is measured.
     """
     rotation = view.fixed_from_camera[:3, :3]  # its inverse is its transpose
     centers = (positions_m - view.fixed_from_camera[:3, 3]).dot(rotation)
