@@ -198,6 +198,15 @@ def test_a_person_half_a_metre_from_a_camera_stays_at_the_place():
     assert np.linalg.norm(tracks[0].position_m[:2] - person.position_m[:2]) < 0.2 and tracks[0].status == VISIBLE
 
 
+def test_a_robot_that_drives_up_to_a_person_does_not_lose_the_legs():
+    """Its camera is that of a Jackal. At 1.2 m it sees no more than the legs."""
+    simulator = Simulator(scenario_from({
+        'duration': 12.0, 'rate': 10.0, 'seed': 1, 'people': [{'start': [2.8, 0.1], 'facing': 3.1, 'height': 1.75}],
+        'robot': {'moves': [{'wait': 0.5}, {'to': [1.4, 0.0], 'speed': 0.5}]}}))
+    detect = depth_detector(simulator)
+    assert all([len(detect(simulator.frame(number)).boxes) == 1 for number in range(simulator.frame_count)])
+
+
 def test_furniture_in_the_place_of_a_person_is_not_detected():
     with_person, with_furniture = Room(), Room()
     with_person.person(0.3, 3.0)
