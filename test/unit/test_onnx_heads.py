@@ -54,7 +54,27 @@ def test_networks_that_suppress_are_known_by_their_metadata():
     assert layout_of([rows], HW, {'args': "{'nms': True}"}).head == 'end-to-end'
 
 
+def test_rows_without_objectness_are_those_of_yolov6():
+    rows = np.hstack((np.random.RandomState(0).uniform(0, 100, (252, 4)), np.ones((252, 1)), np.zeros((252, 3))))
+    assert layout_of([rows[None]], HW, {}).head == 'yolov5'
+
+
+def test_unusual_distributions_by_stride_are_only_those_of_a_given_head():
+    outputs = outputs_of('nanodet', BOXES, SCORES, HW, bins=16)[0][0]
+    parts = [part[None] for values in (outputs[:, :3], outputs[:, 3:]) for part in np.split(values, [192, 240])]
+    with pytest.raises(ValueError, match='no known head'):  # they may be those of YOLOv8, whose input is another one
+        layout_of(parts, HW, {})
+    assert len(detections_in(parts, layout_of(parts, HW, {}, head='nanodet')).boxes) == 3
+
+
+def by_stride(channels):
+    return [np.zeros((1, count) + size) for count in channels for size in ((12, 16), (6, 8), (3, 4))]
+
+
 @pytest.mark.parametrize('given, reason', [
+    (dict(outputs=by_stride((80, 4))), 'first output'),  # distances that are no distributions, as of RTMDet
+    (dict(outputs=by_stride((80, 4)), head='nanodet'), 'first output'),
+    (dict(outputs=[np.zeros((1, 252, 4)), np.zeros((1, 252, 80))]), 'no known head'),  # boxes and scores
     (dict(outputs=[]), 'first output'), (dict(outputs=[np.zeros((1, 77, 79))]), 'no known head'),
     (dict(outputs=[np.full((1, 300, 6), 0.3)]), 'no known head'),  # boxes and scores of two classes
     (dict(names=['a', 'b']), '2 names for its 3 classes'), (dict(head='yolox'), 'cells of strides'),

@@ -11,7 +11,7 @@ P3, P6 = (8, 16, 32), (8, 16, 32, 64)
 GRIDS = (P3, P6, (4, 8, 16, 32))
 TASKS = ('detect', 'segment', 'pose')  # of ultralytics, whose outputs contain boxes
 YOLOV5_ANCHORS = 3  # predictions of each cell
-BINS, OTHER_BINS = 8, (11, 17)  # of usual distributions of distances; the first is that of most networks
+USUAL_CHANNELS = 32, 44, 68  # of four distributions of distances, of 8 bins as in most networks, 11 or 17
 IMAGENET_MEAN, IMAGENET_STD = (123.675, 116.28, 103.53), (58.395, 57.12, 57.375)  # red, green, blue
 BLUE_FIRST = {'color': 'bgr', 'mean': IMAGENET_MEAN[::-1], 'std': IMAGENET_STD[::-1]}
 
@@ -78,8 +78,9 @@ def layout_of(outputs, input_hw, metadata, head='', strides=(), names=()):
     grids = [tuple(strides)] if strides else GRIDS
     for grid in grids:
         order = _order_by_stride(shapes, input_hw, grid)
-        if order and head in ('', 'nanodet', 'picodet'):
-            classes = _rows_and_channels(shapes[order[0]])[1]
+        channels = [_rows_and_channels(shapes[index])[1] for index in order]
+        if order and (head in ('nanodet', 'picodet') or not head and channels[-1] in USUAL_CHANNELS):
+            classes = channels[0]
             return Layout(head or ('picodet' if len(grid) > 3 else 'nanodet'), _checked(classes, names), grid, order)
     if not shapes or len(shapes[0]) != 3 or shapes[0][0] != 1:
         raise ValueError('its first output is not (1, n, m)')
@@ -96,24 +97,32 @@ def layout_of(outputs, input_hw, metadata, head='', strides=(), names=()):
 
 
 def _order_by_stride(shapes, input_hw, grid):
-    """Indices of the scores of each stride, followed by those of the distances; None if the outputs are not these."""
+    """Indices of the scores of each stride, followed by those of the distances; () if the outputs are not these."""
     if len(shapes) != 2 * len(grid) or any(len(shape) not in (3, 4) or shape[0] != 1 for shape in shapes):
-        return None
+        return ()
     scores, distances = [], []
     for stride in grid:
         pair = [index for index, shape in enumerate(shapes)
                 if _rows_and_channels(shape)[0] == cell_count(input_hw, (stride,))]
         if len(pair) != 2:
-            return None
-        pair.sort(key=lambda index: _rows_and_channels(shapes[index])[1] == 4 * BINS)  # stable: else scores are first
+            return ()
+        # The sort is stable: otherwise, the scores are first.
+        pair.sort(key=lambda index: _rows_and_channels(shapes[index])[1] == USUAL_CHANNELS[0])
         scores.append(pair[0])
         distances.append(pair[1])
+        if not _are_bins(_rows_and_channels(shapes[pair[1]])[1]):
+            return ()
     return tuple(scores + distances)
 
 
 def _rows_and_channels(shape):
     """Numbers of cells and channels of an output (1, n, channels) or (1, channels, height, width)."""
     return (shape[1], shape[2]) if len(shape) == 3 else (shape[2] * shape[3], shape[1])
+
+
+def _are_bins(channels):
+    """Whether channels may be four distributions, and not four distances."""
+    return channels % 4 == 0 and channels >= 8
 
 
 def _matches(shape, cells):
@@ -130,9 +139,11 @@ def _head_of(output, input_hw, grid, metadata):
         return 'yolov8'
     if grid and rows == YOLOV5_ANCHORS * cells:
         return 'yolov5'
-    if grid and rows == cells:
+    if grid and rows == cells and columns > 5:
         if not is_probability(output[0, :, 4:]):  # the distributions of distances are before the softmax
             return 'nanodet' if len(grid) == 3 else 'nanodet-plus'
+        if (output[0, :, 4] == 1).all():  # YOLOv6 has no objectness
+            return 'yolov5'
         return 'yolox-decoded' if output[0, :, 0].max() > input_hw[1] / 2 else 'yolox'
     if columns == 6 and not (output[0, :, 5] % 1).any():  # class numbers; else scores, as of RT-DETR with two classes
         return 'end-to-end'
@@ -145,9 +156,8 @@ def _class_count(head, shapes, metadata, names):
     if HEADS[head].suppressed:
         return len(names) or len(COCO)
     if head.startswith(('nanodet', 'picodet')):
-        of_coco = columns - len(COCO) in [4 * bins for bins in OTHER_BINS]
-        count = len(names) or (len(COCO) if of_coco else columns - 4 * BINS)
-        if (columns - count) % 4 or columns - count < 8:
+        count = len(names) or (len(COCO) if columns - len(COCO) in USUAL_CHANNELS else columns - USUAL_CHANNELS[0])
+        if not _are_bins(columns - count):
             raise ValueError('its %d columns are not the scores of %d classes and 4 distances' % (columns, count))
         return _checked(count, names)
     channels = rows - 4 if head == 'yolov8' else columns - 5
