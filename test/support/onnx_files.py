@@ -61,15 +61,18 @@ def distributions(distances, bins):
 
 
 def write_mean_network(path, input_shape=(1, 3, 96, 128), element=FLOAT, channels_last=False):
-    """Write a network whose only detection (1, 1, 6) is the mean of the channels of its input, twice. Returns the path.
+    """Write a network whose only detection (1, 1, 6) is the mean of the channels of its input, twice, but the score 1.
+    Returns the path.
 
-    The mean of the second channel is the score, and that of the third one the class.
+    The mean of the third channel is the class.
     """
     graph = Graph()
     mean = graph.node('ReduceMean', [graph.node('Cast', ['images'], to=FLOAT)], keepdims=0,
                       axes=[1, 2] if channels_last else [2, 3])
     row = graph.node('Reshape', [graph.node('Concat', [mean, mean], axis=1),
                                  graph.constant(np.array([1, 1, 6], np.int64))])
+    score = np.float32([0, 0, 0, 0, 1, 0])
+    row = graph.node('Add', [graph.node('Mul', [row, graph.constant(1 - score)]), graph.constant(score)])
     with open(str(path), 'wb') as stream:
         stream.write(graph.model([('images', element, tuple(input_shape))], [(row, FLOAT, (1, 1, 6))],
                                  {'end2end': 'True'}))

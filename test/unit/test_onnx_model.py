@@ -10,6 +10,8 @@ from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetecto
 from ros_3d_bb.detection.onnx.heads import P3, P6
 from ros_3d_bb.detection.onnx.onnx_model import OnnxModel
 from ros_3d_bb.detection.weights import WeightsError
+from ros_3d_bb.detection.yolov5.backends import open_detector
+from ros_3d_bb.detection.yolov5.onnx_writer import Graph
 from ros_3d_bb.sessions.session_reader import read_color, read_session
 from support.onnx_files import FLOAT, FLOAT16, UINT8, outputs_of, write_constant_network, write_mean_network
 
@@ -192,16 +194,62 @@ def test_yaml_files_that_cannot_be_used_are_rejected(tmp_path, text, reason):
 
 
 @pytest.mark.parametrize('shape, element, reason', [
-    ((1, 1, 96, 128), FLOAT, '1 channels'), ((4, 3, 96, 128), FLOAT, 'not one image'),
-    ((1, 3, 96, 5000), FLOAT, '5000'), ((1, 3, 96, 128), 9, 'tensor')])
+    ((1, 1, 96, 128), FLOAT, '1 channels'), ((4, 3, 96, 128), FLOAT, 'not one image.*batch of 1'),
+    ((1, 3, 96, 5000), FLOAT, '5000'), ((1, 3, 96, 128), 9, 'input is a tensor.bool.*float16')])
 def test_inputs_that_are_not_a_color_image_are_rejected(tmp_path, shape, element, reason):
     path = write_constant_network(tmp_path / 'a.onnx', outputs_of('yolov8', BOXES, SCORES, HW), shape, element)
     with pytest.raises(WeightsError, match=reason):
         OnnxModel(path, 1)
 
 
+def test_several_inputs_are_those_of_postprocessing(tmp_path):
+    graph = Graph()
+    output = graph.node('Identity', [graph.constant(np.zeros((1, 6), np.float32))])
+    path = tmp_path / 'a.onnx'
+    path.write_bytes(graph.model([('image', FLOAT, (1, 3, 96, 128)), ('scale_factor', FLOAT, (1, 2))],
+                                 [(output, FLOAT, (1, 6))], {}))
+    with pytest.raises(WeightsError, match='2 inputs.*postprocessing'):
+        OnnxModel(str(path), 1)
+
+
+def test_scores_that_are_none_are_rejected(tmp_path, monkeypatch):
+    """At the start, if they are those of a grey image, or with the first image in which something is found."""
+    with pytest.raises(WeightsError, match='scores.*3.5.*yolov8'):
+        OnnxModel(write_constant_network(tmp_path / 'a.onnx', outputs_of('yolov8', BOXES, SCORES + 2.6, HW)), 1)
+    network = OnnxModel(write_constant_network(tmp_path / 'b.onnx', [np.zeros((1, 1, 6))]), 1)
+    monkeypatch.setattr(network, '_run', lambda _image: [np.array([[(0, 0.9, 100, 50, 200, 300)]])])  # class, score, box
+    with pytest.raises(ValueError, match='scores.*200.*end-to-end'):
+        network.candidates(np.zeros(HW + (3,), np.uint8), 0.25)
+
+
+def test_sizes_are_multiples_of_the_largest_stride(tmp_path):
+    outputs = outputs_of('yolov5', BOXES, SCORES, (192, 256), P6)  # for the size of the grey image
+    path = write_constant_network(tmp_path / 'a.onnx', outputs, (1, 3, 'h', 'w'))
+    assert OnnxModel(path, 1).stride == 64
+
+
+def test_a_size_that_the_network_cannot_process_is_named(tmp_path):
+    graph = Graph()
+    rows = graph.node('Reshape', ['images', graph.constant(np.array([1, 3 * 192 * 256 // 6, 6], np.int64))])
+    path = tmp_path / 'a.onnx'
+    path.write_bytes(graph.model([('images', FLOAT, (1, 3, 'h', 'w'))], [(rows, FLOAT, (1, 'n', 6))],
+                                 {'end2end': 'True'}))
+    with pytest.raises(ValueError, match='640 x 480'):
+        open_detector(str(path))
+
+
+@pytest.mark.needs('onnx')
+def test_weights_in_a_second_file_are_named(tmp_path):
+    import onnx
+    path = write_constant_network(tmp_path / 'a.onnx', outputs_of('yolov8', BOXES, SCORES, HW))
+    onnx.save(onnx.load(path), path, save_as_external_data=True, location='a.onnx.data', size_threshold=0)
+    with pytest.raises(WeightsError, match='second file.*onnx.save'):
+        OnnxModel(path, 1)
+
+
 @pytest.mark.parametrize('metadata, reason', [
-    ({'names': '3'}, 'names'), ({'stride': '0'}, 'stride'), ({'names': '[' * 100000}, 'a.onnx'),
+    ({'names': '3'}, 'names'), ({'names': 'person,car'}, "'person,car'"), ({'stride': '0'}, 'stride'),
+    ({'stride': '[8, 16]'}, 'stride.*[8, 16].*1 to 1024'), ({'names': '[' * 100000}, 'a.onnx'),
     ({'names': "__import__('os').system('touch run')"}, 'a.onnx'), ({'task': 'classify'}, 'classify')])
 def test_metadata_that_cannot_be_used_is_rejected_and_not_executed(tmp_path, monkeypatch, metadata, reason):
     monkeypatch.chdir(str(tmp_path))

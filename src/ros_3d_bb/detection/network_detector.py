@@ -119,7 +119,8 @@ def class_number(entry, names):
         return names.index(entry)
     if str(entry).isdigit() and int(entry) < len(names):
         return int(entry)
-    raise ValueError('class %r is not among the %d classes of the model: %s' % (entry, len(names), ', '.join(names)))
+    raise ValueError('class %r (~classes) is not among the %d classes of the model: %s'
+                     % (entry, len(names), ', '.join(names)))
 
 
 def fit_image(image, input_hw, stride=None, resize=Resize()):

@@ -39,10 +39,10 @@ def decode_columns(outputs, _input_hw, classes, confidence, _strides=()):
     return Detections(_corners(rows[above, :4]), scores, best)
 
 
-def decode_final(outputs, _input_hw, classes, confidence, _strides=()):
+def decode_final(outputs, _input_hw, _classes, confidence, _strides=()):
     """Networks that include the suppression: rows of x1, y1, x2, y2, score, class number; (1, n, 6 + ...)."""
     rows = outputs[0][0]
-    rows = rows[(rows[:, 4] > confidence) & (rows[:, 5] > -1) & (rows[:, 5] < classes)]
+    rows = rows[rows[:, 4] > confidence]
     return Detections(rows[:, :4], rows[:, 4], rows[:, 5].astype(int))
 
 

@@ -16,9 +16,12 @@ from ros_3d_bb.detection.weights import MAX_CLASSES, WeightsError, class_names
 
 INSTALL = ('ONNX Runtime is not installed; install it with "pip3 install onnxruntime" ("onnxruntime<1.11" on Ubuntu '
            '18.04 and 20.04, see doc/installing.md)')
+TWO_FILES = ('its weights are in a second file; onnx.save(onnx.load("IN.onnx"), "OUT.onnx") in Python writes them to '
+             'one file')
 CPU, CUDA = 'CPUExecutionProvider', 'CUDAExecutionProvider'
 DTYPES = {'tensor(float)': np.float32, 'tensor(float16)': np.float16, 'tensor(uint8)': np.uint8}
 MAX_OUTPUT_BYTES = 2 ** 28
+MAX_SCORE = 1.001  # the rounding of float16 included
 MAX_METADATA = 10 ** 6  # characters
 MAX_LISTED, MAX_LIST_LENGTH = 20, 2000  # inputs or outputs in a message, and characters
 GREY = 114  # of the image by which the head is recognised
@@ -44,11 +47,17 @@ class OnnxModel(object):
         except OSError as error:
             raise WeightsError('weights %s: cannot be read (%s)' % (path, error.strerror))
         except Exception as error:  # a damaged file can raise any exception
-            raise WeightsError('weights %s: %s%s' % (path, cause(error), _signature(self._session)))
+            reason = TWO_FILES if self._session is None and 'external' in str(error).lower() else cause(error)
+            raise WeightsError('weights %s: %s%s' % (path, reason, _signature(self._session)))
 
     def _configure(self, settings, metadata):
         """Read the input, recognise the head by the outputs for a grey image, and set the attributes."""
-        entry, = self._session.get_inputs()
+        entry, *others = self._session.get_inputs()
+        if others:
+            raise ValueError('it has %d inputs; one image expected: export it without postprocessing'
+                             % (1 + len(others)))
+        if entry.type not in DTYPES:
+            raise ValueError('its input is a %s; one of %s expected' % (entry.type, ', '.join(DTYPES)))
         self._input, self._dtype = entry.name, DTYPES[entry.type]
         self._channels_last, self.input_hw = _input_layout(entry.shape)
         self.stride = _stride(metadata, settings)
@@ -59,6 +68,7 @@ class OnnxModel(object):
         outputs = self._run(probe)
         self._layout = layout_of(outputs, probe_hw, metadata, settings.head, settings.strides, names)
 
+        self.stride = max((self.stride,) + self._layout.strides)
         self._head = HEADS[self._layout.head]
         self.description += ', head: %s' % self._layout.head
         self.names = class_names(names or None, self._layout.classes)
@@ -72,14 +82,23 @@ class OnnxModel(object):
         """Detections in an image with a score above the confidence, see `network_detector.NetworkDetector`."""
         outputs = self._run(image)
         outputs = [outputs[index].astype(np.float32, copy=False) for index in self._layout.order]
-        return self._head.decode(outputs, image.shape[:2], self._layout.classes, confidence, self._layout.strides)
+        found = self._head.decode(outputs, image.shape[:2], self._layout.classes, confidence, self._layout.strides)
+        best = found.scores.max() if len(found.scores) else 0.0
+        if best > MAX_SCORE:
+            raise ValueError('its scores are up to %.3g; 0 to 1 expected: its outputs are not those of the head %s'
+                             % (best, self._layout.head))
+        return found
 
     def _run(self, image):
         """Outputs of the network for an RGB image (height, width, 3), uint8; ValueError if they are too large."""
         batch = self._prepare(image)
         if self._channels_last:
             batch = np.ascontiguousarray(batch.transpose(0, 2, 3, 1))
-        outputs = self._session.run(None, {self._input: batch})
+        try:
+            outputs = self._session.run(None, {self._input: batch})
+        except Exception as error:  # ONNX Runtime has a type of exception for each cause
+            raise ValueError('the network cannot process an image of %d x %d pixels (%s); export it with a fixed size'
+                             % (image.shape[1], image.shape[0], cause(error)))
         outputs = [output[None] if output.ndim == 2 else output for output in outputs]  # exports without a batch axis
         if sum(output.nbytes for output in outputs) > MAX_OUTPUT_BYTES:
             raise ValueError('its outputs are larger than %d MB' % (MAX_OUTPUT_BYTES // 2 ** 20))
@@ -102,7 +121,7 @@ def _preprocessing(dtype, head, settings):
 def _input_layout(shape):
     """Whether the channels of an input are last, and its (height, width), None if dynamic. Raises ValueError."""
     if len(shape) != 4 or (isinstance(shape[0], int) and shape[0] != 1):
-        raise ValueError('its input is not one image')
+        raise ValueError('its input is not one image: export it with a batch of 1')
     channels_last = shape[3] == 3 and shape[1] != 3
     if not channels_last and isinstance(shape[1], int) and shape[1] != 3:
         raise ValueError('its input has %d channels; 3 expected' % shape[1])
@@ -117,10 +136,10 @@ def _input_layout(shape):
 
 def _stride(metadata, settings):
     """Number of pixels of which height and width are multiples."""
-    stride = int(metadata.get('stride', max(settings.strides or (32,))))
-    if not 1 <= stride <= MAX_STRIDE:
-        raise ValueError('its stride is %d; 1 to %d expected' % (stride, MAX_STRIDE))
-    return stride
+    stride = str(metadata.get('stride', max(settings.strides or (32,))))
+    if not (stride.isdigit() and 1 <= int(stride) <= MAX_STRIDE):
+        raise ValueError('its stride is %.40r; 1 to %d expected' % (stride, MAX_STRIDE))
+    return int(stride)
 
 
 def _names(metadata):
@@ -132,8 +151,8 @@ def _names(metadata):
         raise ValueError('its names are longer than %d characters' % MAX_METADATA)
     try:
         names = ast.literal_eval(text)  # executes no code
-    except (SyntaxError, ValueError) as error:
-        raise ValueError('its names cannot be read (%s)' % error)
+    except (SyntaxError, ValueError):
+        raise ValueError('its names are %.60r; a list or a dictionary expected' % text)
     count = len(names) if isinstance(names, (dict, list, tuple)) else 0
     if not 0 < count <= MAX_CLASSES:
         raise ValueError('its names are not those of 1 to %d classes' % MAX_CLASSES)
