@@ -117,6 +117,7 @@ def test_the_gap_to_the_nearest_depth_image():
     assert recorder.frames == [('boxes', None, None)]
     text = recorder.sync.gap_text(NS + 112 * MS)
     assert '0.112 s apart' in text and text.endswith('~stamp_tolerance: 0.12')
+    assert 'another clock' in recorder.sync.gap_text(6 * NS)  # a tolerance of 5 s would pair other images
 
 
 @pytest.fixture

@@ -128,7 +128,7 @@ def units_fault(depth):
     integers = depth.values.dtype.kind == 'u'
     unit, scale_m = ('metres', 1) if median_m < NEAREST_M else ('millimetres', 0.001)
     return ('the depth image has the wrong unit: half of its pixels are nearer than %.3g m; its values seem to be %s '
-            'in a %s image, whose unit is %s (REP 118): fix the driver, or set depth_scale: %g'
+            'in a %s image, whose unit is %s (REP 118): fix the driver, or set ~depth_scale: %g'
             % (median_m, unit, '16UC1' if integers else '32FC1', 'millimetres' if integers else 'metres',
                scale_m))
 

@@ -148,6 +148,9 @@ class StampSynchronizer(object):
         if depth is None:
             return ''
         gap_s = abs(depth.stamp_ns - stamp_ns) / NS
+        if gap_s * NS > self._length_ns:
+            return ('colour and depth are %.3f s apart at best: depth images are missing, or have stamps of another '
+                    'clock' % gap_s)
         return ('colour and depth are %.3f s apart at best; to pair them, set ~stamp_tolerance: %.2f'
                 % (gap_s, math.ceil(100 * gap_s) / 100))
 

@@ -124,7 +124,8 @@ class RgbdSource(object):
             if TILT_UNKNOWN not in self._events.counts:
                 self._events.note(TILT_UNKNOWN, 'the tilt of the camera is unknown, as there is no transform from %s '
                                   'to %s: %s; positions are estimated as if it were level, and the detector depth fits '
-                                  'the floor to the depth image (~floor_frame)'
+                                  'the floor to the depth image; set ~floor_frame to a frame of tf whose z axis points '
+                                  'up, such as map'
                                   % (self._params.floor_frame, frame_id, error))
             return None
 
