@@ -217,7 +217,7 @@ def test_scores_that_are_none_are_rejected(tmp_path, monkeypatch):
     with pytest.raises(WeightsError, match='scores.*3.5.*yolov8'):
         OnnxModel(write_constant_network(tmp_path / 'a.onnx', outputs_of('yolov8', BOXES, SCORES + 2.6, HW)), 1)
     network = OnnxModel(write_constant_network(tmp_path / 'b.onnx', [np.zeros((1, 1, 6))]), 1)
-    monkeypatch.setattr(network, '_run', lambda _image: [np.array([[(0, 0.9, 100, 50, 200, 300)]])])  # class, score, box
+    monkeypatch.setattr(network, '_run', lambda _image: [np.array([[(0, 0.9, 100, 50, 200, 300)]])])  # class first
     with pytest.raises(ValueError, match='scores.*200.*end-to-end'):
         network.candidates(np.zeros(HW + (3,), np.uint8), 0.25)
 

@@ -58,6 +58,12 @@ def silent(key, **changes):
     return with_stream(key, count=0, rate_hz=0.0, stamps_ns=(), lag_s=None, **changes)
 
 
+def late(lag_s, tf_fault=''):
+    """Messages that arrive some time after their stamps."""
+    return sound(streams={key: sound_stream(key, lag_s=lag_s) for key in ROLES},
+                 tf=TfSeen('map', 'optical', 1000.0, LINKS, tf_fault))
+
+
 def without_tf(*missing, **changed):
     """No transform, as frames are missing in tf or links are changed."""
     links = {frame: link for frame, link in dict(LINKS, **changed).items() if frame not in missing}
@@ -97,6 +103,8 @@ CASES = [
     (with_stream(DEPTH, lag_s=9e6), 'stamps', '104.2 days before ROS time', 'use_sim_time true'),
     (with_stream(DEPTH, lag_s=-9.0), 'stamps', '9.0 s after ROS time', 'chrony'),
     (exact(with_stream(COLOR, stamps_ns=moved(STAMPS, 0.05))), 'pairs', 'only 0 %', 'stamp_tolerance'),
+    (with_stream(DEPTH, lag_s=3.05), 'pairs', 'arrive together are 3.0 s apart', 'same clock'),
+    (sound(tf=TfSeen('map', '', 1000.0, LINKS, 'the error of tf2')), 'transforms', 'no frame_id', 'frame_id:=FRAME'),
     (without_tf(*LINKS), 'transforms', 'tf has no frames', 'robot_state_publisher'),
     (without_tf(*LINKS), 'transforms', 'tf has no frames',
      'static_transform_publisher 0 0 1.2 -1.5708 0 -1.6708 map optical'),
@@ -190,10 +198,13 @@ def test_a_bag_needs_no_boxes_and_one_with_boxes_no_colour():
 @pytest.mark.parametrize('seen, fault, fix', [
     (silent(INFO, published_kind='')._replace(color_info=None), 'there is no /camera/info in the bag', 'record it'),
     (silent(INFO), 'no messages on /camera/info in the first 5 s', 'record it'),
-    (with_stream(DEPTH, lag_s=7300.0), 'the stamps on /camera/depth are 2.0 hours from the time', 'process_bag')])
+    (with_stream(DEPTH, lag_s=7300.0), 'stamps on /camera/color and /camera/depth that arrive together', 'same clock'),
+    (late(7300.0), 'the stamps on /camera/color are 2.0 hours from the time', 'process_bag accepts'),
+    (late(7300.0, tf_fault='the error of tf2'), 'the stamps on /camera/color are 2.0 hours', 'play with --clock')])
 def test_a_fault_of_a_bag_is_reported_with_its_fix(seen, fault, fix):
-    wrong, = faults_in(seen._replace(is_bag=True))
+    wrong, *others = faults_in(seen._replace(is_bag=True))
     assert wrong.fault.startswith(fault) and fix in wrong.fix
+    assert not seen.tf.fault and not others or seen.tf.fault and 'process_bag accepts' not in wrong.fix
 
 
 @pytest.mark.parametrize('values, scale_m, fault', [

@@ -75,6 +75,8 @@ def test_an_optical_target_frame_is_rejected():
     rig = Rig(target_frame='kinect2_rgb')
     with pytest.raises(ValueError, match='kinect2_rgb is an optical frame.*~target_frame'):
         rig.send(START_NS, frame_id='/kinect2_rgb')
+    with pytest.raises(ValueError, match='no frame_id.*~frame_id'):
+        rig.add_boxes(boxes(START_NS, '', []), 0)
 
 
 def add_images(rig, stamp_ns, encoding='16UC1'):

@@ -163,14 +163,27 @@ def _stamp_fault(seen, key):
         return '', ''  # reported by _clock
     if not seen.is_bag:
         return clock_fault(stream, seen.use_sim_time)
-    if abs(stream.lag_s) <= LATE_S:
+    if abs(stream.lag_s) <= LATE_S or _clocks_differ(seen):  # reported by _pairs_of_images
         return '', ''
+    is_usable = seen.tf is None or not seen.tf.fault
     return ('the stamps on %s are %s from the time of their recording' % (topic, span(abs(stream.lag_s))),
-            'to record a bag while another one is played, set use_sim_time and play with --clock; process_bag accepts '
-            'this bag as it is')
+            'to record a bag while another one is played, set use_sim_time and play with --clock%s'
+            % ('; process_bag accepts this bag as it is' if is_usable else ''))
+
+
+def _clocks_differ(seen):
+    """Whether colour and depth images that arrive together have stamps that are too far apart to be paired."""
+    lags_s = [seen.streams[key].lag_s for key in (COLOR, DEPTH)]
+    return None not in lags_s and abs(lags_s[0] - lags_s[1]) > seen.cache_length_s
 
 
 def _pairs_of_images(seen):
+    if _clocks_differ(seen):
+        color, depth = seen.streams[COLOR], seen.streams[DEPTH]
+        yield Finding('pairs', '', 'stamps on %s and %s that arrive together are %s apart'
+                      % (color.topic, depth.topic, span(abs(color.lag_s - depth.lag_s))),
+                      'their publishers must use the same clock, and send both in time')
+        return
     share = paired_share(seen.streams[COLOR].stamps_ns, seen.streams[DEPTH].stamps_ns, seen.stamp_tolerance_s)
     if share is not None:
         fact = '%.0f %% of the colour images have a depth image with their stamp' % (100 * share)
@@ -184,6 +197,11 @@ def _transforms(seen):
     if seen.tf is None:
         return
     target, source, stamp_s, links, fault = seen.tf
+    if not source:
+        yield Finding('transforms', '', 'the images have no frame_id',
+                      'set it in their publisher, or pass frame_id:=FRAME (process_bag: frame_id in the file of '
+                      '--bbox3d-params)')
+        return
     optical_fault = target_frame_fault(target, source)
     if optical_fault:
         yield Finding('transforms', '', optical_fault, 'frame_world:=map, and %s' % pose_fix(source))

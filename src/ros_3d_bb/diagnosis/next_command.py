@@ -65,7 +65,7 @@ def _frame_and_pose(seen, target, faults):
     if not faults:
         return target, ''
     root = root_of(seen.tf.links, seen.tf.source)
-    if root == seen.tf.target or target_frame_fault(seen.tf.target, seen.tf.source):
+    if not root or root == seen.tf.target or target_frame_fault(seen.tf.target, seen.tf.source):
         return None
     if root in ROBOT_FRAMES:
         return ' --target-frame ' + root, ''
