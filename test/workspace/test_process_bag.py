@@ -161,6 +161,15 @@ def test_transforms_may_be_later_than_the_image_by_tf_timeout(scene, tmp_path):
         assert ('no transform' not in events.counts) == is_known
 
 
+def test_transforms_of_old_bags_are_used(scene, tmp_path):
+    old = type('tfMessage', (TFMessage,), {'_type': 'tf/tfMessage'})
+    path = changed_bag(scene, tmp_path / 'in.bag', lambda topic, message, time: (
+        topic, old(message.transforms) if topic == '/tf' else message, time))
+    assert BagReader(path).topics['/tf'] == 'tf/tfMessage'
+    events = process_bag(path, str(tmp_path / 'out.bag'), DEPTH)
+    assert not {'no transform', 'transforms rejected'} & set(events.counts) and events.counts['images with tracks']
+
+
 def test_transforms_of_another_frame_with_old_stamps_change_nothing():
     """Also after a lookup that failed: the frame `base` remains available at all stamps of its last 10 s."""
     transforms = BagTransforms()

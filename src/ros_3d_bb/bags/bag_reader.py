@@ -101,8 +101,11 @@ class BagReader(object):
 
 
 def message_in(raw, *kinds):
-    """Deserialize a Raw as one of some message classes. Raises ValueError if its type differs, or it is damaged."""
-    kind = next((kind for kind in kinds if (raw.datatype, raw.md5sum) == (kind._type, kind._md5sum)), None)
+    """Deserialize a Raw as one of some message classes. Raises ValueError if its type differs, or it is damaged.
+
+    Its name may differ: /tf of old bags is a tf/tfMessage, which has the definition of tf2_msgs/TFMessage.
+    """
+    kind = next((kind for kind in kinds if raw.md5sum == kind._md5sum), None)
     if kind is None:
         raise ValueError('%s has messages of type %s (%s); %s expected'
                          % (raw.topic, raw.datatype, raw.md5sum,
