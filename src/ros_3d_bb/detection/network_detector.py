@@ -119,6 +119,9 @@ def class_number(entry, names):
         return names.index(entry)
     if str(entry).isdigit() and int(entry) < len(names):
         return int(entry)
+    if names == [str(number) for number in range(len(names))]:
+        raise ValueError('class %r is unknown: the model has no names of its %d classes; write them to the key names '
+                         'of a YAML file beside an ONNX file, see doc/onnx.md' % (entry, len(names)))
     raise ValueError('class %r (~classes) is not among the %d classes of the model: %s'
                      % (entry, len(names), ', '.join(names)))
 
