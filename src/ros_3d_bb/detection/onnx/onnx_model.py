@@ -18,6 +18,7 @@ INSTALL = ('ONNX Runtime is not installed; install it with "pip3 install onnxrun
            '18.04 and 20.04, see doc/installing.md)')
 TWO_FILES = ('its weights are in a second file; onnx.save(onnx.load("IN.onnx"), "OUT.onnx") in Python writes them to '
              'one file')
+LOCATION = b'\x0a\x08location'  # key of the name of that file, with its field number and length
 CPU, CUDA = 'CPUExecutionProvider', 'CUDAExecutionProvider'
 DTYPES = {'tensor(float)': np.float32, 'tensor(float16)': np.float16, 'tensor(uint8)': np.uint8}
 MAX_OUTPUT_BYTES = 2 ** 28
@@ -47,7 +48,7 @@ class OnnxModel(object):
         except OSError as error:
             raise WeightsError('weights %s: cannot be read (%s)' % (path, error.strerror))
         except Exception as error:  # a damaged file can raise any exception
-            reason = TWO_FILES if self._session is None and 'external' in str(error).lower() else cause(error)
+            reason = TWO_FILES if self._session is None and LOCATION in content else cause(error)
             raise WeightsError('weights %s: %s%s' % (path, reason, _signature(self._session)))
 
     def _configure(self, settings, metadata):
