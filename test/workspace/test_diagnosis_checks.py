@@ -107,7 +107,7 @@ CASES = [
     (sound(tf=TfSeen('map', '', 1000.0, LINKS, 'the error of tf2')), 'transforms', 'no frame_id', 'frame_id:=FRAME'),
     (without_tf(*LINKS), 'transforms', 'tf has no frames', 'robot_state_publisher'),
     (without_tf(*LINKS), 'transforms', 'tf has no frames',
-     'static_transform_publisher 0 0 1.2 -1.5708 0 -1.6708 map optical'),
+     'static_transform_publisher 0 0 1.2 -1.5708 0 -1.6708 map optical, and pass floor_frame:=map'),
     (sound(tf=TfSeen('optical', 'optical', 1000.0, {}, '')), 'transforms', 'is an optical frame', 'camera_height:=1.2'),
     (sound(tf=TfSeen('rgb_optical_frame', 'optical', 1000.0, LINKS, '')), 'transforms', 'is an optical frame',
      'frame_world:=map'),

@@ -81,8 +81,8 @@ def _missing_link(frames, root, target):
 def pose_fix(frame):
     """How to publish the pose of a camera that is not on a robot; `frame` is its optical frame."""
     return ('publish its pose, here 1.2 m above the floor and tilted down by 0.1 rad: rosrun tf2_ros '
-            'static_transform_publisher 0 0 1.2 -1.5708 0 -1.6708 map %s; the launch arguments camera_height:=1.2 '
-            'camera_tilt:=0.1 frame_id:=%s do the same; process_bag: --camera-height 1.2 --camera-tilt 0.1; or let '
+            'static_transform_publisher 0 0 1.2 -1.5708 0 -1.6708 map %s, and pass floor_frame:=map; the launch arguments '
+            'camera_height:=1.2 camera_tilt:=0.1 frame_id:=%s do both; process_bag: --camera-height 1.2 --camera-tilt 0.1; or let '
             'camera_pose:=floor (--camera-pose floor) fit it to the floor' % (frame, frame))
 
 
