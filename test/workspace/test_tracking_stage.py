@@ -6,7 +6,7 @@ from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
-from ros_3d_bb.camera.camera_model import transform_from
+from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from
 from ros_3d_bb.conversions.image_msgs import fill_image
 from ros_3d_bb.conversions.perception_msgs import occupied_from_msg, time_from
 from ros_3d_bb.core.detector_model import DetectorModel
@@ -77,6 +77,16 @@ def test_an_optical_target_frame_is_rejected():
         rig.send(START_NS, frame_id='/kinect2_rgb')
     with pytest.raises(ValueError, match='no frame_id.*~frame_id'):
         rig.add_boxes(boxes(START_NS, '', []), 0)
+
+
+def test_boxes_in_the_frame_of_the_body_of_the_camera_are_rejected(rig):
+    """Their z axis points up. A camera that looks up by 45 degrees is none."""
+    pitched = transform_from((0, 0, 1), (0, np.sin(-np.pi / 8), 0, np.cos(np.pi / 8)))
+    rig.transforms.lookup = lambda *_names: pitched.dot(transform_from((0, 0, 0), OPTICAL_ROTATION))
+    assert rig.send(START_NS) is not None
+    rig.transforms.lookup = lambda *_names: transform_from((0, 0, 1), (0, 0, 0, 1))
+    with pytest.raises(ValueError, match='frame camera .*no optical frame.*up by 90 degrees.*~frame_id'):
+        rig.send(START_NS + PERIOD_NS)
 
 
 def add_images(rig, stamp_ns, encoding='16UC1'):

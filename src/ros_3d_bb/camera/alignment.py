@@ -6,6 +6,7 @@ import numpy as np
 
 from ros_3d_bb.camera.images import FARTHEST_M
 
+LOOKS_UP = 0.85  # z component of a viewing direction from which on it is none, about 60 degrees; chosen
 SAME_PX = 1.0  # intrinsics that differ by less count as equal: half a pixel is 1 cm at 6 m
 ALIGN = ('start the camera with realsense.launch, or realsense2_camera with align_depth:=true, and use '
          'camera/aligned_depth_to_color/image_raw, or pass depth:=raw, which registers raw depth')
@@ -59,6 +60,16 @@ def target_frame_fault(target_frame, camera_frame=''):
         return ('the target frame %s is an optical frame: its z axis is the viewing direction, but tracks need one '
                 'that points up' % target_frame)
     return ''
+
+
+def viewing_fault(camera_frame, target_from_camera):
+    """Check the pose (4, 4) of a camera in a frame whose z axis points up: no camera that sees people looks up steeply,
+    but the z axis of its body does, if the images have that frame instead of the optical one.
+    """
+    if target_from_camera[2, 2] < LOOKS_UP:
+        return ''
+    return ('by tf, the frame %s of the images is no optical frame (x right, y down, z forward): the camera would look up '
+            'by %.0f degrees' % (camera_frame, np.degrees(np.arcsin(min(target_from_camera[2, 2], 1.0)))))
 
 
 class EdgeComparison(object):

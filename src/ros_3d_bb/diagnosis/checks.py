@@ -7,7 +7,7 @@ from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault, si
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, INFO_TOPICS
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, LATEST_NS, TRACKS_TOPIC
 from ros_3d_bb.diagnosis.observations import IMAGE, KEPT, Finding, Role
-from ros_3d_bb.diagnosis.tf_tree import pose_fix, root_of, why_missing
+from ros_3d_bb.diagnosis.tf_tree import optical_frame_fix, pose_fix, root_of, why_missing
 from ros_3d_bb.diagnosis.topic_faults import (LATE_S, MIN_PAIRED, MIN_RATE_HZ, NO_CLOCK, clock_fault, paired_share,
                                               silence_fault, span)
 
@@ -196,7 +196,7 @@ def _pairs_of_images(seen):
 def _transforms(seen):
     if seen.tf is None:
         return
-    target, source, stamp_s, links, fault = seen.tf
+    target, source, stamp_s, links, fault, of_viewing = seen.tf
     if not source:
         yield Finding('transforms', '', 'the images have no frame_id',
                       'set it in their publisher, or pass frame_id:=FRAME (process_bag: frame_id in the file of '
@@ -209,6 +209,8 @@ def _transforms(seen):
         cause, fix = why_missing(links, target, source, stamp_s)
         fault = 'no transform from %s to %s at the stamp of the image: %s' % (source, target, cause or fault)
         yield Finding('transforms', '', fault, fix or 'inspect the tree with rosrun tf view_frames')
+    elif of_viewing:
+        yield Finding('transforms', '', of_viewing, optical_frame_fix(links, source))
     else:
         yield Finding('transforms', '%s to %s is available at the stamp of the image' % (source, target))
 

@@ -10,7 +10,7 @@ from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.bags.bag_reader import BagReader, message_in
 from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
-from ros_3d_bb.camera.alignment import EdgeComparison, frames_fault, size_fault
+from ros_3d_bb.camera.alignment import EdgeComparison, frames_fault, size_fault, viewing_fault
 from ros_3d_bb.conversions.camera_msgs import (DEPTH_TOPICS, IMAGE_KINDS, RAW, STATIC_TOPIC, TF_TOPIC, info_of_images,
                                                uncompressed)
 from ros_3d_bb.conversions.image_msgs import DEPTH_SCALES, imgmsg_to_depth, imgmsg_to_rgb
@@ -99,12 +99,12 @@ class Observation(object):
                     default=0)  # tf has no transforms from before a jump back in time
         stamp_ns = stamps_ns[(begin + len(stamps_ns)) // 2]  # the middle one: its transforms must have arrived
         target, source = target_frame.lstrip('/'), (source_frame or self.newest.header.frame_id).lstrip('/')
-        stamp, fault = time_from(stamp_ns), ''
+        stamp, fault, of_viewing = time_from(stamp_ns), '', ''
         try:
-            transforms.lookup(target, source, stamp)
+            of_viewing = viewing_fault(source, transforms.lookup(target, source, stamp))
         except tf2_ros.TransformException as error:
             fault = str(error)
-        return TfSeen(target, source, stamp.to_sec(), links_in(transforms.all_frames_as_yaml()), fault)
+        return TfSeen(target, source, stamp.to_sec(), links_in(transforms.all_frames_as_yaml()), fault, of_viewing)
 
 
 def observations_of(observed, depth_info, topics, seconds, publishers_of=lambda _topic: (), depth_scale=0.0, **others):

@@ -59,6 +59,7 @@ class TfSeen(NamedTuple):
     stamp_s: float
     links: dict  # of all frames, {frame: tf_tree.Link}
     fault: str  # why there is no transform; empty if there is one
+    viewing_fault: str = ''  # why the frame cannot be that of the images
 
 
 class Observations(NamedTuple):

@@ -81,9 +81,20 @@ def _missing_link(frames, root, target):
 def pose_fix(frame):
     """How to publish the pose of a camera that is not on a robot; `frame` is its optical frame."""
     return ('publish its pose, here 1.2 m above the floor and tilted down by 0.1 rad: rosrun tf2_ros '
-            'static_transform_publisher 0 0 1.2 -1.5708 0 -1.6708 map %s, and pass floor_frame:=map; the launch arguments '
-            'camera_height:=1.2 camera_tilt:=0.1 frame_id:=%s do both; process_bag: --camera-height 1.2 --camera-tilt 0.1; or let '
-            'camera_pose:=floor (--camera-pose floor) fit it to the floor' % (frame, frame))
+            'static_transform_publisher 0 0 1.2 -1.5708 0 -1.6708 map %s, and pass floor_frame:=map; the launch '
+            'arguments camera_height:=1.2 camera_tilt:=0.1 frame_id:=%s do both; process_bag: --camera-height 1.2 '
+            '--camera-tilt 0.1; or let camera_pose:=floor (--camera-pose floor) fit it to the floor' % (frame, frame))
+
+
+def optical_frame_fix(links, frame):
+    """How to correct the frame of images, or its transform, which have the axes of a body."""
+    if is_optical(frame):
+        return 'correct its transform: ' + _publisher_command(links[frame].parent, frame)
+    optical = [other for other in links if is_optical(other)]
+    name = nearest_name(frame, optical) if optical else frame + '_optical_frame'
+    fix = 'frame_id:=%s (process_bag: frame_id in the file of --bbox3d-params)' % name
+    return fix if optical else ('publish it by rosrun tf2_ros static_transform_publisher 0 0 0 -1.5708 0 -1.5708 %s '
+                                '%s, and pass %s' % (frame, name, fix))
 
 
 def _publisher_command(parent, frame):

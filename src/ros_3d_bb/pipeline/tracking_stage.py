@@ -8,7 +8,7 @@ import numpy as np
 import tf2_ros
 from std_msgs.msg import Header
 
-from ros_3d_bb.camera.alignment import POSE, target_frame_fault
+from ros_3d_bb.camera.alignment import POSE, target_frame_fault, viewing_fault
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, RAW, topic_of
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
@@ -168,6 +168,11 @@ class TrackingStage(object):
                                   'awaited' % (stamp_ns / NS))
 
     def _track(self, message, stamp_ns, fixed_from_camera, camera, camera_name):
+        fault = viewing_fault(self._params.camera_frame or message.header.frame_id, fixed_from_camera)
+        if fault:
+            self._tracker.skip(stamp_ns, camera_name)
+            raise ValueError('%s; set ~frame_id (launch argument frame_id:=) to the optical frame, or correct its '
+                             'transform' % fault)
         boxes, faults = usable_boxes3d(message)
         if faults:
             self._events.count_dropped('3D boxes', faults)
