@@ -68,8 +68,8 @@ def viewing_fault(camera_frame, target_from_camera):
     """
     if target_from_camera[2, 2] < LOOKS_UP:
         return ''
-    return ('by tf, the frame %s of the images is no optical frame (x right, y down, z forward): the camera would look up '
-            'by %.0f degrees' % (camera_frame, np.degrees(np.arcsin(min(target_from_camera[2, 2], 1.0)))))
+    return ('by tf, the frame %s of the images is no optical frame (x right, y down, z forward): the camera would look '
+            'up by %.0f degrees' % (camera_frame, np.degrees(np.arcsin(min(target_from_camera[2, 2], 1.0)))))
 
 
 class EdgeComparison(object):
