@@ -11,7 +11,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.diagnosis.checks import BOXES2D, BOXES3D, COLOR, DEPTH, INFO, TRACKS, findings
 from ros_3d_bb.diagnosis.observations import Newest, Observations, Publisher, Role, Stream, TfSeen
 from ros_3d_bb.diagnosis.tf_tree import Link, links_in, why_missing
-from ros_3d_bb.diagnosis.topic_faults import paired_share
+from ros_3d_bb.diagnosis.topic_faults import other_topic, paired_share
 
 IMAGE, CAMERA = 'sensor_msgs/Image', Camera(640, 480, 600, 600, 320, 240)
 STAMPS = tuple(1000 * NS + number * NS // 10 for number in range(50))
@@ -190,6 +190,19 @@ def test_consequences_of_a_fault_are_not_reported(count):
     seen.streams[BOXES3D] = sound_stream(BOXES3D, count=count)
     seen.streams[TRACKS] = sound_stream(TRACKS, count=0)
     assert [finding.subject for finding in faults_in(seen)] == ['depth images']
+
+
+def test_colour_is_not_looked_for_in_infrared_images():
+    """Topics of a Kinect v2, whose infrared camera has another size than its colour camera."""
+    topics = {'/kinect2/%s' % name: kind for kind, names in (
+        (IMAGE, ('qhd/image_color_rect', 'qhd/image_depth_rect', 'sd/image_ir_rect', 'sd/image_depth_rect')),
+        ('sensor_msgs/CameraInfo', ('qhd/camera_info', 'sd/camera_info')),
+        ('sensor_msgs/PointCloud2', ('sd/points',))) for name in names}
+    for key, name, expected in ((COLOR, 'camera/color/image_raw', 'qhd/image_color_rect'),
+                                (INFO, 'camera/color/camera_info', 'qhd/camera_info')):
+        stream = sound_stream(key, topic='/' + name, role=ROLES[key]._replace(name=name))
+        assert other_topic(stream, topics) == '/kinect2/' + expected
+    assert other_topic(stream, {'/ir/camera_info': 'sensor_msgs/CameraInfo'}) == '/ir/camera_info'  # there is no other
 
 
 def test_a_bag_needs_no_boxes_and_one_with_boxes_no_colour():

@@ -1,12 +1,16 @@
 """Faults of topics: silence, stamps far from the current time, and stamps that do not match."""
+import re
+
 import numpy as np
 
+from ros_3d_bb.conversions.camera_msgs import info_topic_beside
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.core.time_sync import NS, half_period_of
-from ros_3d_bb.diagnosis.observations import COMPRESSED_IMAGE
+from ros_3d_bb.diagnosis.observations import COMPRESSED_IMAGE, IMAGE
 
 LATE_S, EARLY_S = 5.0, 2.0  # tolerated time of a stamp before and after ROS time
 MIN_RATE_HZ = 4.0  # of images; tracks of walking people are lost at lower rates
+NOT_COLOR = re.compile(r'depth|(^|[/_])(ir|infra\d*)([/_]|$)', re.IGNORECASE)  # by names of drivers
 MIN_PAIRED = 0.5  # required fraction of boxes with a depth image of the same stamp
 NO_CLOCK = ('/use_sim_time is set, but there are no messages on /clock: ROS time stands still',
             'play the bag with rosbag play --clock, or rosparam set use_sim_time false, and restart the nodes')
@@ -46,7 +50,8 @@ def _rename(stream, topics, used, start):
 def other_topic(stream, topics, used=()):
     """Return the name of the topic that a Stream without messages probably has; empty if there is none.
 
-    `topics` is {name: type}; those in `used` have another role. Depth is preferred for depth, and not for colour.
+    `topics` is {name: type}; those in `used` have another role. Depth is preferred for depth; for colour neither it
+    nor infrared is, and a camera_info beside colour images.
     """
     role, is_depth = stream.role, 'depth' in stream.role.name
     others = sorted(name for name, kind in topics.items()
@@ -55,6 +60,11 @@ def other_topic(stream, topics, used=()):
                     # image_transport publishes both transports of any image, but only one of them is usable
                     and (kind != COMPRESSED_IMAGE or name.endswith('/compressedDepth') == is_depth))
     others = [name for name in others if ('depth' in name.lower()) == is_depth] or others
+    if not is_depth:
+        colors = [name for name, kind in topics.items()
+                  if kind in (IMAGE, COMPRESSED_IMAGE) and not NOT_COLOR.search(name)]
+        preferred = set(colors + list(map(info_topic_beside, colors)))
+        others = [name for name in others if name in preferred] or others
     return nearest_name(stream.topic, others) if others else ''
 
 
