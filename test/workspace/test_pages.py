@@ -187,3 +187,13 @@ def test_named_files_and_launch_arguments_exist(page):
             assert glob.glob(os.path.join(ROOT, path)), path
         if ' ' not in code and not code.startswith('-'):
             assert set(re.findall(r'\b([a-z]\w*):=', code)) - known == set(), code
+
+
+@pytest.mark.parametrize('page', PAGES)
+def test_launch_files_have_the_arguments_of_commands(page):
+    """roslaunch refuses others."""
+    commands = text_of(page).replace('\\\n', '')  # which may continue on the next line
+    for name, given in re.findall(r'roslaunch (?:--\S+ )?ros_3d_bb ([a-z]\w*\.launch)(.*)', commands):
+        arguments = ElementTree.parse(os.path.join(ROOT, 'launch', name)).getroot().findall('arg')
+        settable = set(argument.get('name') for argument in arguments if argument.get('value') is None)
+        assert set(re.findall(r'\b(\w+):=', given)) <= settable, (name, given)
