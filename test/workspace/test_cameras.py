@@ -9,7 +9,6 @@ from ros_3d_bb.pipeline.people_pipeline import Settings
 from ros_3d_bb_lab.evaluation.clear_mot import score
 from ros_3d_bb_lab.evaluation.demo.scene_report import panels_of, read_recording
 from support.bags import messages_in, scene_bag
-from support.launching import loaded
 from support.two_cameras import Rig
 
 # A person walks from the view of the front camera into that of the left one; another one stands in both views.
@@ -63,13 +62,3 @@ def test_a_camera_missing_in_a_bag_is_named(bags, tmp_path):
 def test_inconsistent_parameters_are_rejected(params, complaint):
     with pytest.raises(ValueError, match=complaint):
         Rig(*params.pop('cameras'), **params)
-
-
-@pytest.mark.parametrize('cameras', ['front, left, rear', 'front'])
-def test_the_pipeline_starts_nodes_for_each_camera_and_one_tracker(cameras):
-    parameters, _nodes = loaded('pipeline.launch', 'detector:=depth', 'cameras:=' + cameras)
-    names = [name.strip() for name in cameras.split(',')]
-    started = set(name.rsplit('/', 1)[0] for name in parameters if name.count('/') > 1)
-    assert started - {'/tracker_node'} == set('/%s/%s' % (name, node) for name in names
-                                              for node in ('depth_detector_node', 'bbox3d_node'))
-    assert parameters['/tracker_node/cameras'] == cameras

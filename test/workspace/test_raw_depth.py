@@ -20,7 +20,6 @@ from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
 from support.bags import changed_bag, messages_in
-from support.launching import loaded
 from support.masterless import published
 
 IMAGES, COLOR_FRAME, DEPTH_FRAME = 5, 'camera_color_optical_frame', 'camera_depth_optical_frame'
@@ -29,7 +28,7 @@ MOUNT_M = (0.17, 0.0, 0.20)
 BASELINE_M = 0.05  # between the cameras
 PEOPLE = [{'start': [2.2, 0.5], 'facing': 3.1}, {'start': [3.2, -0.9], 'moves': [{'to': [3.2, -0.3]}]},
           {'start': [5.0, -0.2], 'facing': 1.0}]
-RAW_TOPIC, RAW_INFO_TOPIC = DEPTH_TOPICS['raw']
+RAW_INFO_TOPIC = DEPTH_TOPICS['raw'][1]
 
 
 def simulator(beside_m, camera):
@@ -115,13 +114,3 @@ def test_what_registration_needs_is_named_if_it_is_missing(bag, tmp_path, unwant
     events = process_bag(str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'), settings())
     assert events.counts['2D boxes rejected'] == IMAGES
     assert all(name in events.sentences['2D boxes rejected'] for name in named)
-
-
-@pytest.mark.parametrize('cameras,count,topics', [
-    ('', 3, {'camera/depth/image_rect_raw'}),
-    ('front,rear', 5, {'depth/image_rect_raw', 'camera/depth/image_rect_raw'})])
-def test_one_argument_of_the_pipeline_sets_the_parameters_and_topics(cameras, count, topics):
-    """Detectors and bbox3d_node run in the namespace of their camera; the tracker adds the namespaces itself."""
-    parameters, nodes = loaded('pipeline.launch', 'detector:=depth', 'depth:=raw', 'cameras:=' + cameras)
-    assert [value for name, value in parameters.items() if name.endswith('/depth')] == ['raw'] * count
-    assert {dict(node.remap_args)[RAW_TOPIC] for node in nodes.values()} == topics
