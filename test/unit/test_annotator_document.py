@@ -7,7 +7,6 @@ from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.sessions.session_reader import SessionError, read_session
 from ros_3d_bb_annotator.document import Document
-from ros_3d_bb_annotator.marks import Mark
 from ros_3d_bb_annotator.validation import problems_of
 from support.small_session import (FAR_BOX, NEAR_BOX, NEAR_MM, change_json, read_json, write_measurement,
                                    write_small_session)
@@ -15,31 +14,6 @@ from support.small_session import (FAR_BOX, NEAR_BOX, NEAR_MM, change_json, read
 
 def states(document):
     return [measurement.state for measurement in document.measurements]
-
-
-def test_a_new_session_is_read(document):
-    first = document.measurements[0]
-    assert states(document) == ['new'] * 4 and document.progress == (0, 4)
-    assert (first.id, first.stamp_text, first.label, first.person) == ('m0', '1616161616.000000005', 'by the door', 0)
-    assert [detection.box_px for detection in first.detections] == [NEAR_BOX, FAR_BOX]
-    assert first.detections[0].size_m.tolist() == [0.533, 1.4] and first.detections[0].support == 0.9
-    assert first.detections[0].truncated is False and first.detections[1].truncated is None
-    assert document.grid == (Mark('A1', -0.5, 2.0),) and document.camera.width == 64
-    assert document.color(0)[20, 20].tolist() == [200, 30, 30]
-    assert document.depth(0).values[20, 20] == NEAR_MM and document.depth(0).scale_m == 0.001
-
-
-def test_truth_is_saved_immediately_and_read_by_benchmarks(document, folder):
-    document.set_truths([1], 0.1, 2.3)
-    document.choose_person(2, 1)
-    document.set_truths([2], 0.1, 2.3, -0.05)
-    entries = read_json(folder)['frames']
-    assert entries[1]['truth_mm'] == {'x': 100, 'z': 2300} and entries[2]['truth_mm'] == {'x': 100, 'z': 2300, 'y': -50}
-    frames = read_session(folder).frames
-    assert frames[1].truth_m == (0.1, None, 2.3) and frames[2].truth_m == (0.1, -0.05, 2.3)
-    assert frames[2].boxes_px == (FAR_BOX, NEAR_BOX) and frames[2].estimate_m.tolist() == [0.7, 0.1, 3.0]
-    assert frames[0].stamp_ns == 1616161616000000005 and frames[0].label == 'by the door'
-    assert Document(folder).measurements[2].truth_m == (0.1, -0.05, 2.3)
 
 
 @settings(max_examples=25)
