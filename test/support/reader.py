@@ -13,7 +13,7 @@ import rosgraph
 
 from ros_3d_bb_lab.evaluation.launching import free_port, running
 from support.code_blocks import ROOT
-from support.launching import RS_CAMERA_ARGUMENTS, stand_in_gazebo, stand_in_launch_file, write
+from support.launching import RS_CAMERA_ARGUMENTS, stand_in_launch_file, write
 from support.screen import start_screen
 
 SUPPORT = os.path.join(ROOT, 'test', 'support')
@@ -39,7 +39,7 @@ class Reader(object):
     def __init__(self, folder, weights):
         self.home, self.clone, self.etc = folder / 'home', folder / 'home' / 'ros_3d_bb', folder / 'etc'
         self.log, self.cache, self._display = folder / 'log.txt', folder / 'cache', None
-        for path in (self.home / 'catkin_ws' / 'src', self.etc, folder / 'path' / 'to', self.clone):
+        for path in (self.home / 'catkin_ws' / 'src', self.etc, self.clone):
             path.mkdir(parents=True)
         self.log.write_text('')
         os.symlink(weights, str(self.home / os.path.basename(weights)))
@@ -47,20 +47,16 @@ class Reader(object):
             os.symlink(os.path.join(ROOT, name), str(self.clone / name))
         shutil.copytree(os.path.join(ROOT, 'config'), str(self.clone / 'config'))
         self._put_stand_ins(folder / 'packages')
-        self._replacements = [('/path/to/', '%s/path/to/' % folder), ('/etc/ros/', '%s/' % self.etc),
-                              ('/opt/ros/noetic/', '%s/' % self.etc), ('/home/administrator/', '%s/' % self.home),
-                              ('yolov5n.pt', os.path.basename(weights))]
+        self._replacements = [('/opt/ros/noetic/', '%s/' % self.etc), ('yolov5n.pt', os.path.basename(weights))]
         self._environment = dict(
-            os.environ, HOME=str(self.home), USER='reader', READER_LOG=str(self.log), READER_WEIGHTS=weights,
+            os.environ, HOME=str(self.home), USER='reader', READER_LOG=str(self.log), READER_BAG='',
             READER_CLONE=str(self.clone), ROS_3D_BB_CACHE=str(self.cache), ROS_LOG_DIR=str(folder / 'ros_log'),
-            ROS_PACKAGE_PATH='%s:%s' % (folder / 'packages', os.environ['ROS_PACKAGE_PATH']), ROS_HOSTNAME='localhost',
-            READER_BAG='')
-        for name in ('DISPLAY', 'ROS_IP', 'JACKAL_URDF_EXTRAS'):
+            ROS_PACKAGE_PATH='%s:%s' % (folder / 'packages', os.environ['ROS_PACKAGE_PATH']), ROS_HOSTNAME='localhost')
+        for name in ('DISPLAY', 'ROS_IP'):
             self._environment.pop(name, None)
 
     def _put_stand_ins(self, packages):
         """Packages that a test machine does not have, and the virtual environment that `run` would make."""
-        stand_in_gazebo(packages)
         stand_in_launch_file(packages, 'realsense2_camera/launch/rs_camera.launch', RS_CAMERA_ARGUMENTS, CAMERA_DRIVER)
         python = self.cache / 'venv' / 'bin' / 'python3'
         write(python, '#!/bin/sh\nexec %s "$@"\n' % sys.executable)
@@ -88,12 +84,12 @@ class Reader(object):
         return result.stdout
 
     @contextlib.contextmanager
-    def running(self, block, at=None, replaced=(), **environment):
+    def running(self, block, **environment):
         """Run a block until Ctrl-C. Yields a Graph, and ends it."""
         environment = dict({'ROS_MASTER_URI': 'http://localhost:%d' % free_port()}, **environment)
         with contextlib.ExitStack() as processes:
             graph = Graph(self.environment(**environment), processes)
-            graph.start(['bash', '-c', self.typed(block, replaced)], cwd=str(at or self.home))
+            graph.start(['bash', '-c', self.typed(block)], cwd=str(self.home))
             yield graph
 
     def screen(self):
