@@ -9,6 +9,7 @@ from ros_3d_bb.planning.safe_speed import (LEAST_WIDTH_M, CornerParams, SafeSpee
                                            highest_safe_speed, limited_velocity, speed_before_corners)
 from ros_3d_bb_lab.simulation.laser import BEAMS, FIELD_OF_VIEW, RANGE_M, scan_ranges
 from ros_3d_bb_lab.simulation.scenario import scenario_from
+from support.people import mounted
 from support.tracks import track_at
 
 PARAMS = SafeSpeedParams(position_sigmas=0.0)
@@ -88,6 +89,15 @@ def test_positions_are_those_of_now_in_the_frame_of_the_robot():
     robot_from_tracks = np.array([[0.0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])  # it looks along y
     now = speed_among(track_at([3.0, 0.0, 0.9], [-1.0, 0, 0]))
     assert speed_among(walking, age_s=1.0, robot_from_tracks=robot_from_tracks) == pytest.approx(now)
+
+
+@pytest.mark.parametrize('tilt_deg', [{'pitch_deg': 5}, {'pitch_deg': -5}, {'roll_deg': 5}])
+def test_a_robot_on_a_slope_300_m_above_the_origin_is_as_fast_as_on_the_level(tilt_deg):
+    def speed(**angles_deg):
+        map_from_robot = mounted(300.0, yaw_deg=30, **angles_deg).dot(np.linalg.inv(mounted(0.0)))
+        standing = track_at([1.5, 0.9, 300.9], [0, 0, 0], moving=False)
+        return speed_among(standing, robot_from_tracks=np.linalg.inv(map_from_robot))
+    assert speed(**tilt_deg) == pytest.approx(speed(), abs=0.05) and speed() < 1.3
 
 
 def test_people_behind_one_who_limits_the_speed_take_little_time():

@@ -150,9 +150,9 @@ def _path(velocity, lengths_m):
 
 def _distances_to_person(track, age_s, robot_from_tracks, params, ahead_s, places_m):
     """Distances (n, m) of places (m, 2) from the centre of a person at times (n,); 1: on the ellipse."""
-    rotation, shift_m = robot_from_tracks[:2, :2], robot_from_tracks[:2, 3]
+    rotation, robot_m = robot_from_tracks[:2, :2], np.linalg.inv(robot_from_tracks)[:2, 3]
     ahead_s = age_s + ahead_s
-    centers_m = position_after(track, ahead_s)[:, :2].dot(rotation.T) + shift_m
+    centers_m = (position_after(track, ahead_s)[:, :2] - robot_m).dot(rotation.T)  # also where the robot is tilted
     covariances_m2 = np.matmul(np.matmul(rotation, covariances_after(track, ahead_s)[:, :2, :2]), rotation.T)
     variances_m2, axes = np.linalg.eigh(covariances_m2)
     radius_m = track.size_m[0] / 2 + params.robot_radius + params.people_clearance
