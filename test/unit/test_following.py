@@ -97,6 +97,15 @@ def test_an_id_switch_to_a_person_who_crosses_is_noticed(turn_mps, followed):
     assert found == followed
 
 
+def test_someone_who_comes_to_where_the_person_stood_is_not_the_person():
+    """Who has begun to walk, and is visible all the time."""
+    selector = TargetSelector()
+    for time_s in np.arange(1, 5, 0.1):
+        walked_m = max(time_s - 2, 0)
+        newcomer = [person(3, 2, -1.2 + 0.5 * walked_m, vy=0.5, first_s=2.05)] if time_s > 2.3 else []
+        assert selected(selector, time_s, person(1, 2 + walked_m, 0, vx=float(time_s > 2)), *newcomer) == 1
+
+
 @pytest.mark.parametrize('x, followed', [(4.6, 2), (3.7, 1)])
 def test_two_people_who_have_changed_tracks_are_noticed(x, followed):
     """A person stands hidden by the one who walks along x. Their tracks part, and one of them is at x: in the way, or

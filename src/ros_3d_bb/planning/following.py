@@ -81,7 +81,8 @@ class TargetSelector(object):
         self._seen = {}  # _Seen by track ID
         self._path = []  # _Seen of the target in the last PATH_NS, up to a change of its ID
         self._changed_ns = None  # stamp of that change
-        self._back = {}  # (_Seen before, stamp since) of tracks that have been visible again for at most PATH_NS, by ID
+        # (_Seen before, if any, _Seen then) of tracks that became visible at most PATH_NS ago, by ID
+        self._begun = {}
         self._latest_ns = None  # stamp of the latest tracks
 
     def select(self, tracks, stamp_ns, robot_m, params):
@@ -112,40 +113,52 @@ class TargetSelector(object):
         """Note which tracks are visible, and which are published. Others are forgotten after `longest_s` seconds."""
         self._seen = {key: seen for key, seen in self._seen.items()
                       if key == self.target.id or stamp_ns - seen.stamp_ns <= longest_s * NS}
-        self._back = {key: back for key, back in self._back.items() if stamp_ns - back[1] <= PATH_NS}
+        self._begun = {key: begun for key, begun in self._begun.items() if stamp_ns - begun[1].stamp_ns <= PATH_NS}
         for track in tracks:
-            seen = self._seen.get(track.id)
+            seen, now = self._seen.get(track.id), _Seen(track, stamp_ns, stamp_ns)
             if track.status == VISIBLE:
-                if seen and seen.stamp_ns < self._latest_ns:
-                    self._back[track.id] = seen, stamp_ns
-                self._seen[track.id] = _Seen(track, stamp_ns, stamp_ns)
+                if not seen or seen.stamp_ns < self._latest_ns:
+                    self._begun[track.id] = seen, now
+                self._seen[track.id] = now
             elif seen:
                 self._seen[track.id] = seen._replace(published_ns=stamp_ns)
         self._latest_ns = stamp_ns
 
     def _check_identity(self, tracks, stamp_ns):
         """Change to another track where the tracker has confused the person with one who crosses: the old track has
-        left the path that was predicted before the other one began, or was visible again, and that is on it. Change
-        back to the former track if this is on the path."""
+        left the path that was predicted before the other one began, or was visible again, and that began on it and is
+        on it. Change back to the former track if this is on the path."""
         own = self._seen[self.target.id]
         if own.stamp_ns < stamp_ns and not self._has_changed(stamp_ns):
             return
         self._path = [seen for seen in self._path if 0 <= stamp_ns - seen.stamp_ns <= PATH_NS]
-        tracks = [track._replace(first_seen_ns=self._back[track.id][1]) if track.id in self._back else track
-                  for track in tracks]
+        tracks = [track._replace(first_seen_ns=self._begun[track.id][1].stamp_ns) if self._before_hidden(track.id)
+                  else track for track in tracks]
         new_ns = [track.first_seen_ns for track in tracks
                   if self._path and track.first_seen_ns > self._path[0].stamp_ns + SWITCHING_NS]
         if new_ns:
             before = [seen for seen in self._path if seen.stamp_ns < min(new_ns) - SWITCHING_NS][-1]
             old = predicted_to([own.track], (stamp_ns - own.stamp_ns) / NS)[0]._replace(first_seen_ns=stamp_ns)
-            self._change_to_nearest([track for track in tracks if track.id != own.track.id], before, stamp_ns,
-                                    [_normalized_distance(old, before, stamp_ns)])
+            continuing = [track for track in tracks if track.id != own.track.id and (
+                track.id == before.track.id or self._has_begun_near(track.id, before))]
+            self._change_to_nearest(continuing, before, stamp_ns, [_normalized_distance(old, before, stamp_ns)])
         if not self._has_changed(stamp_ns):
             self._path.append(own)
 
     def _has_changed(self, stamp_ns):
         """Whether the ID of the target has changed within the last PATH_NS."""
         return self._changed_ns is not None and stamp_ns - self._changed_ns <= PATH_NS
+
+    def _before_hidden(self, track_id):
+        """The _Seen of a track before it was hidden, if it has been visible again for at most PATH_NS; else None."""
+        return self._begun.get(track_id, (None, None))[0]
+
+    def _has_begun_near(self, track_id, before):
+        """Whether a track became visible at most PATH_NS ago, within NEAR_M of where `before` was expected then."""
+        if track_id not in self._begun:
+            return False
+        _before_hidden, begun = self._begun[track_id]
+        return np.linalg.norm(begun.track.position_m[:2] - _expected_m(before, begun.stamp_ns)) <= NEAR_M
 
     def _change_to_nearest(self, tracks, before, stamp_ns, others):
         """Make the track that is nearest to where `before`, a _Seen, is expected the target, if its distance is clearly
@@ -157,8 +170,8 @@ class TargetSelector(object):
             return
         distance, track_id = near[0]
         lost = [seen for key, seen in self._seen.items() if key != self.target.id and seen.stamp_ns < stamp_ns]
-        if track_id in self._back and track_id != before.track.id:
-            lost.append(self._back[track_id][0])
+        if self._before_hidden(track_id) and track_id != before.track.id:
+            lost.append(self._before_hidden(track_id))
         others = others + [other for other, _id in near[1:]] + [
             _normalized_distance(self._seen[track_id].track, seen, stamp_ns) for seen in lost]
         if max(distance / CLEARLY, distance + LEAST_DIFFERENCE) < min(others, default=np.inf):
@@ -180,9 +193,13 @@ def _normalized_distance(track, seen, stamp_ns):
     lost, seen_ns, published_ns = seen
     if track.first_seen_ns <= seen_ns and track.id != lost.id:
         return np.inf
-    expected_m = position_after(lost, min((stamp_ns - seen_ns) / NS, LONGEST_PREDICTION_S))
     farthest_m = min(NEAR_M + TURNING_MPS * (stamp_ns - published_ns) / NS, FARTHEST_M)
-    return np.linalg.norm((track.position_m - expected_m)[:2]) / farthest_m
+    return np.linalg.norm(track.position_m[:2] - _expected_m(seen, stamp_ns)) / farthest_m
+
+
+def _expected_m(seen, stamp_ns):
+    """Position (2,) where a lost track, a _Seen, is expected."""
+    return position_after(seen.track, min((stamp_ns - seen.stamp_ns) / NS, LONGEST_PREDICTION_S))[:2]
 
 
 class Follower(object):
