@@ -191,6 +191,17 @@ def test_the_robot_decelerates_when_the_person_is_lost():
     assert velocities[-1] == (0.0, 0.0) and drive.follower.person is None
 
 
+def test_the_robot_does_not_drive_nearer_to_a_person_who_is_no_longer_tracked():
+    """It keeps free where the person may be, also until the person counts as lost."""
+    standing = person(1, 1.2, 0)._replace(covariance=np.diag([.04, .04, 0, 0, 0, 0]))
+    standing = standing._replace(prediction_covariance_m2=np.tile(standing.covariance[:3, :3], (8, 1, 1)))
+    follower, speeds_mps = Follower(PARAMS._replace(distance=0.8), SAFETY), []
+    for stamp_s, tracks in ((1.0, [standing]), (1.6, [])):
+        follower.update(tracks, int(stamp_s * NS), np.eye(4))
+        speeds_mps.append([follower.command(tracks, 0.1, np.eye(4), STEP_S)[0] for _step in range(20)][-1])
+    assert follower.person.status == OCCLUDED and speeds_mps[1] == pytest.approx(speeds_mps[0], abs=0.01)
+
+
 def test_another_id_is_followed_at_once_and_other_changes_keep_the_person():
     follower = Follower(PARAMS, SAFETY)
     tracks = [person(1, 2, 0), person(2, 3, 0)]

@@ -109,11 +109,19 @@ def _interpolated(rows, step_s, times_s):
 
 
 def predicted_to(tracks, ahead_s):
-    """Predict tracks `ahead_s` seconds ahead, see `position_after`; the result has no predictions, and no velocity
-    where a track does not move.
+    """Predict tracks `ahead_s` seconds ahead, see `position_after` and `covariances_after`; the result has no
+    predictions, and no velocity where a track does not move.
     """
-    return [track._replace(position_m=position_after(track, ahead_s), velocity_mps=walking_velocity(track),
-                           prediction_m=np.empty((0, 3)), prediction_covariance_m2=None) for track in tracks]
+    return [_predicted_to(track, ahead_s) for track in tracks]
+
+
+def _predicted_to(track, ahead_s):
+    covariance, covariances_m2 = track.covariance, track.prediction_covariance_m2
+    if covariance is not None and covariances_m2 is not None:
+        covariance, covariances_m2 = covariance.copy(), covariances_m2[:0]
+        covariance[:3, :3], = covariances_after(track, [ahead_s])
+    return track._replace(position_m=position_after(track, ahead_s), velocity_mps=walking_velocity(track),
+                          prediction_m=np.empty((0, 3)), covariance=covariance, prediction_covariance_m2=covariances_m2)
 
 
 def in_frame(tracks, b_from_a):
