@@ -19,7 +19,7 @@ from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
 NEAR_M, TURNING_MPS, FARTHEST_M = 0.5, 1.0, 2.0
 # A change of IDs is searched for in the last PATH_NS, and changes a track from SWITCHING_NS before the new one; chosen.
 PATH_NS, SWITCHING_NS = 3 * NS, NS // 2
-MISSED_NS = NS // 2  # people who are not visible for this time are missed by the detector, and not hidden; chosen
+MISSED_NS = NS // 2  # who is not visible for at most this time was missed by the detector, and not hidden; chosen
 # A distance (see `_normalized_distance`) is clearly less than another one by this ratio and this difference; chosen.
 CLEARLY, LEAST_DIFFERENCE = 0.5, 0.3
 LONGEST_PREDICTION_S = 2.0  # people who are lost for longer have probably turned or stopped; chosen
