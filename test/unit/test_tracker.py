@@ -71,7 +71,7 @@ def test_a_person_who_comes_too_near_for_the_camera_stays_before_it(speed_mps, r
     assert np.linalg.norm(objects[0].velocity_mps) < 0.1
 
 
-@pytest.mark.parametrize('beside_m,depth_m', [(0.35, np.nan), (0.0, 4.0)])
+@pytest.mark.parametrize('beside_m,depth_m', [(0.6, np.nan), (0.0, 4.0)])
 def test_a_person_who_has_passed_the_camera_goes_on_behind_it(beside_m, depth_m):
     """Beside it, or the depth image shows the wall behind the place of the person."""
     tracker, view = Tracker(), VIEW._replace(depth_at=lambda points: np.full(len(points), depth_m))

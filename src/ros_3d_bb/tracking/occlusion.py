@@ -124,20 +124,20 @@ def contradicting_cameras(tracks, stamp_ns):
 
 
 def _meets(track, former, view):
-    """Whether someone who walks would pass through a camera at the height of the body, or come nearer than `NEAREST_M`,
-    and the depth image does not show that nobody is at the place of the former State."""
+    """Whether someone who walks would pass a camera at the height of the body nearer than `NEAREST_M`, and the depth
+    image does not show that nobody is at the place of the former State."""
     if view.depth_at is None or not track.is_moving:
         return False
     camera_x, camera_y, camera_z = view.fixed_from_camera[:3, 3].tolist()
     u, v, speed_mps = former.u, former.v, math.hypot(former.u, former.v)
     to_x, to_y = camera_x - former.x, camera_y - former.y
-    is_ahead = to_x * u + to_y * v > 0 and abs(to_x * v - to_y * u) < BODY_RADIUS_M * speed_mps
+    is_ahead = to_x * u + to_y * v > 0 and abs(to_x * v - to_y * u) < NEAREST_M * speed_mps
     is_near = (camera_x - track.state.x) * u + (camera_y - track.state.y) * v < NEAREST_M * speed_mps
     if not (is_ahead and is_near and abs(camera_z - track.z_m) < track.size_m[2] / 2):
         return False
-    _hidden, (present,), _farther, (unknown,) = _in_depth(view, np.array([[former.x, former.y, track.z_m]]),
-                                                          np.array([track.size_m]))
-    return present or unknown
+    _hidden, _present, _farther, (clear,), _unknown = _in_depth(view, np.array([[former.x, former.y, track.z_m]]),
+                                                                np.array([track.size_m]))
+    return not clear
 
 
 def _stop(track, former, share):
@@ -190,7 +190,7 @@ def classify_visibility(view, positions_m, sizes_m, others_m, max_range_m):
     visibility[out_of_range | (shares < LEAST_IN_IMAGE)] = OUT_OF_VIEW
     undecided = np.flatnonzero((visibility != OCCLUDED) & ~out_of_range & (shares > 0))
     if view.depth_at is not None and len(undecided):
-        hidden, present, farther, unknown = _in_depth(view, positions_m[undecided], sizes_m[undecided])
+        hidden, present, farther, _clear, unknown = _in_depth(view, positions_m[undecided], sizes_m[undecided])
         visibility[undecided[hidden & (visibility[undecided] == VISIBLE)]] = OCCLUDED
         visibility[undecided[unknown & (distances_m[undecided] < BLIND_M)]] = OUT_OF_VIEW
         present &= shares[undecided] < RELIABLE_IN_IMAGE
@@ -266,9 +266,9 @@ def _half_widths(distances_m):
 
 
 def _in_depth(view, positions_m, sizes_m):
-    """People occluded by objects, people who are there, those who are farther than their axis, and those without depth,
-    (n,) bool each: most of the depth measured towards the body is clearly nearer, or that of something at its distance,
-    or farther; or none is measured.
+    """People occluded by objects, people who are there, those who are farther than their axis, those who are not there,
+    and those without depth, (n,) bool each: most of the depth measured towards the body is clearly nearer, or that of
+    something at its distance, or farther, or clearly farther; or none is measured.
     """
     rotation = view.fixed_from_camera[:3, :3]  # its inverse is its transpose
     centers = (positions_m - view.fixed_from_camera[:3, 3]).dot(rotation)
@@ -280,6 +280,7 @@ def _in_depth(view, positions_m, sizes_m):
     known = np.isfinite(depths_m)
     behind_m = np.where(known, points[..., 2] - depths_m, np.nan)
     with np.errstate(invalid='ignore'):  # nan is neither
-        each = behind_m > HIDDEN_BEHIND_M, np.abs(behind_m) <= HIDDEN_BEHIND_M, behind_m < 0
+        each = (behind_m > HIDDEN_BEHIND_M, np.abs(behind_m) <= HIDDEN_BEHIND_M, behind_m < 0,
+                behind_m < -HIDDEN_BEHIND_M)
     counts = np.maximum(known.sum(axis=1), ACROSS.size / 3.0)
     return [some.sum(axis=1) > HIDDEN_SHARE * counts for some in each] + [~known.any(axis=1)]
