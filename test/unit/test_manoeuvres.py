@@ -62,6 +62,13 @@ def test_a_person_who_stops_or_turns_while_missed_keeps_the_id(velocity_mps):
     assert len(all_ids(play(30, 3, boxes_at))) == 1
 
 
+@pytest.mark.parametrize('rate_hz', RATES_HZ)
+def test_a_first_box_with_a_wrong_depth_gives_a_standing_person_no_lasting_velocity(rate_hz):
+    outputs = play(rate_hz, 3, lambda time_s: [(4.0 if time_s < 0.5 / rate_hz else 3.0, 0.0)])
+    for tracks in outputs[max(int(rate_hz), 4):]:
+        assert abs(tracks[-1].position_m[0] - 3) < 0.3 and abs(tracks[-1].velocity_mps[0]) < 1
+
+
 @pytest.mark.parametrize('rate_hz', [3, 5, 10, 30])
 def test_a_person_found_in_every_second_image_is_published(rate_hz):
     outputs = play(rate_hz, 10, lambda time_s: [(3.0, 0.0)] if round(time_s * rate_hz) % 2 == 0 else [])

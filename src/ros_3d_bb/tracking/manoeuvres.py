@@ -14,7 +14,7 @@ import math
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.association import HIDDEN_FEET_COST, height_cost
 from ros_3d_bb.tracking.kalman_filter import faster
-from ros_3d_bb.tracking.track import LatestBox
+from ros_3d_bb.tracking.track import HIT_CORRELATION_S, LatestBox
 
 # All are chosen; `./run bench tracking --rates` shows the effect of others.
 RUNNING_MPS = 6.0  # of new tracks, whose velocity is unknown: people run no faster indoors
@@ -32,7 +32,8 @@ def match_manoeuvres(tracks, measurements, matches, latest_ns, stamp_ns, height_
     """The pairs (Track, Measurement) outside of the gate that have no other candidates.
 
     `matches` are those of the association, `latest_ns` is the stamp of the latest image of the camera. The velocities
-    of the tracks become as uncertain as their motion to the measurement.
+    of the tracks become as uncertain as their motion to the measurement. The motion starts at rest at the latest box: a
+    wrong velocity must not lead away from boxes that agree. At high rates, both boxes may be outliers.
     """
     earliest_ns = max(min(latest_ns, stamp_ns - RECENT_NS), stamp_ns - LONGEST_NS)
     seen = [track for track in tracks if earliest_ns <= track.last_ns < stamp_ns]
@@ -52,6 +53,8 @@ def match_manoeuvres(tracks, measurements, matches, latest_ns, stamp_ns, height_
     for track, measurement in pairs:
         elapsed_s = (stamp_ns - track.last_ns) / NS
         speed_mps = max(_distance_m(track, measurement) - BESIDE_M, 0) / elapsed_s
+        if elapsed_s >= HIT_CORRELATION_S:
+            track.state = track.state._replace(x=track.latest.x, y=track.latest.y, u=0.0, v=0.0)
         track.state = faster(track.state, elapsed_s, speed_mps ** 2)
     return pairs
 
