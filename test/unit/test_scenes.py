@@ -54,7 +54,7 @@ def test_everybody_in_the_thesis_scenes_keeps_one_id(runs, name, detector):
     assert len(result.people) == 4
     for person in result.people:
         assert person.visible_s >= 1 and len(person.ids) == 1, person
-        assert person.followed > 0.8 and person.rmse_m < 0.25, person
+        assert person.detected > 0.8 and person.rmse_m < 0.25, person
     assert len(set(person.ids[0] for person in result.people)) == 4
 
 
