@@ -8,6 +8,7 @@ import pytest
 
 from conftest import DATA
 from ros_3d_bb.estimation.error_model import read_error_model
+from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb_lab.evaluation.clear_mot import score
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_paths, scene_name
 from ros_3d_bb_lab.evaluation.scene_benchmark import (RANGE_M, depth_detector, detections_without_scores,
@@ -82,3 +83,16 @@ def test_a_person_approaching_to_half_a_metre_is_one_visible_track(name):
     assert (result['track_ids'], result['not_visible'], result['id_switches']) == (1, 0, 0)
     assert result['rmse_m'] < result['worst_m'] < 0.25
     assert result['velocity_rmse_mps'] < 0.3 and result['prediction_1s_m'] < 0.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('name', scenario_paths('approach_*'), ids=scene_name)
+def test_a_person_too_near_for_the_weight_free_detector_stays_tracked(name):
+    simulator, ids = Simulator(read_scenario(name)), set()
+    for step in run_scene(simulator, depth_detector(simulator), 2):
+        (person,), camera_m = step.frame.people, step.frame.poses.map_from_camera[:3, 3]
+        if plane_distances([person.position_m], [camera_m]) < 0.6:
+            track, = step.moment.tracks
+            ids.add(track.id)
+            assert plane_distances([person.position_m], [track.position_m]) < 0.5
+    assert len(ids) == 1
