@@ -1,3 +1,4 @@
+import io
 import pickle
 import re
 import zipfile
@@ -97,7 +98,10 @@ def test_tensors_that_exceed_their_storage_are_rejected(path, change, named):
 
 
 def with_flipped_byte(content):
-    middle = len(content) // 2
+    """In the middle of the largest file of an archive: between the files are bytes without a checksum."""
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        largest = max(map(archive.read, archive.namelist()), key=len)
+    middle = content.index(largest) + len(largest) // 2
     return content[:middle] + bytes([content[middle] ^ 255]) + content[middle + 1:]
 
 
