@@ -125,7 +125,7 @@ def contradicting_cameras(tracks, stamp_ns):
 
 def _meets(track, former, view):
     """Whether someone who walks would pass a camera at the height of the body nearer than `NEAREST_M`, and the depth
-    image does not show that nobody is at the place of the former State."""
+    image does not show that the place of the former State is empty."""
     if view.depth_at is None or not track.is_moving:
         return False
     camera_x, camera_y, camera_z = view.fixed_from_camera[:3, 3].tolist()
@@ -135,9 +135,8 @@ def _meets(track, former, view):
     is_near = (camera_x - track.state.x) * u + (camera_y - track.state.y) * v < NEAREST_M * speed_mps
     if not (is_ahead and is_near and abs(camera_z - track.z_m) < track.size_m[2] / 2):
         return False
-    _hidden, _present, _farther, (clear,), _unknown = _in_depth(view, np.array([[former.x, former.y, track.z_m]]),
-                                                                np.array([track.size_m]))
-    return not clear
+    seen = _in_depth(view, np.array([[former.x, former.y, track.z_m]]), np.array([track.size_m]))
+    return not seen.empty[0]
 
 
 def _stop(track, former, share):
@@ -190,12 +189,12 @@ def classify_visibility(view, positions_m, sizes_m, others_m, max_range_m):
     visibility[out_of_range | (shares < LEAST_IN_IMAGE)] = OUT_OF_VIEW
     undecided = np.flatnonzero((visibility != OCCLUDED) & ~out_of_range & (shares > 0))
     if view.depth_at is not None and len(undecided):
-        hidden, present, farther, _clear, unknown = _in_depth(view, positions_m[undecided], sizes_m[undecided])
-        visibility[undecided[hidden & (visibility[undecided] == VISIBLE)]] = OCCLUDED
-        visibility[undecided[unknown & (distances_m[undecided] < BLIND_M)]] = OUT_OF_VIEW
-        present &= shares[undecided] < RELIABLE_IN_IMAGE
+        seen = _in_depth(view, positions_m[undecided], sizes_m[undecided])
+        visibility[undecided[seen.hidden & (visibility[undecided] == VISIBLE)]] = OCCLUDED
+        visibility[undecided[seen.unknown & (distances_m[undecided] < BLIND_M)]] = OUT_OF_VIEW
+        present = seen.present & (shares[undecided] < RELIABLE_IN_IMAGE)
         visibility[undecided[present]] = PRESENT
-        visibility[undecided[present & farther]] = STAYED
+        visibility[undecided[present & seen.farther]] = STAYED
     return visibility
 
 
@@ -265,11 +264,22 @@ def _half_widths(distances_m):
     return np.arcsin(np.minimum(BODY_RADIUS_M / np.maximum(distances_m, 0.01), 1))
 
 
-def _in_depth(view, positions_m, sizes_m):
-    """People occluded by objects, people who are there, those who are farther than their axis, those who are not there,
-    and those without depth, (n,) bool each: most of the depth measured towards the body is clearly nearer, or that of
-    something at its distance, or farther, or clearly farther; or none is measured.
+class _InDepth(NamedTuple):
+    """What the depth image shows at the places of people, (n,) bool each.
+
+    Most of the depth measured towards the body is clearly nearer (`hidden`), at its distance (`present`), farther than
+    its axis (`farther`), or clearly farther (`empty`); or none is measured (`unknown`).
     """
+
+    hidden: np.ndarray
+    present: np.ndarray
+    farther: np.ndarray
+    empty: np.ndarray
+    unknown: np.ndarray
+
+
+def _in_depth(view, positions_m, sizes_m):
+    """The _InDepth of people with centres and extents (n, 3)."""
     rotation = view.fixed_from_camera[:3, :3]  # its inverse is its transpose
     centers = (positions_m - view.fixed_from_camera[:3, 3]).dot(rotation)
     right = rotation.T.dot((view.ahead[1], -view.ahead[0], 0))
@@ -283,4 +293,4 @@ def _in_depth(view, positions_m, sizes_m):
         each = (behind_m > HIDDEN_BEHIND_M, np.abs(behind_m) <= HIDDEN_BEHIND_M, behind_m < 0,
                 behind_m < -HIDDEN_BEHIND_M)
     counts = np.maximum(known.sum(axis=1), ACROSS.size / 3.0)
-    return [some.sum(axis=1) > HIDDEN_SHARE * counts for some in each] + [~known.any(axis=1)]
+    return _InDepth(*[some.sum(axis=1) > HIDDEN_SHARE * counts for some in each], unknown=~known.any(axis=1))
