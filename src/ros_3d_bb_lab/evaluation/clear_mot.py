@@ -102,10 +102,11 @@ def _person_score(person_id, moments, matches, cameras):
         visible_ns.append(moment.stamp_ns)
         for person, track in pairs:
             if person.id == person_id:
-                errors_m.append(_distance_m(track, person))
+                errors_m.append(distance_m(track.position_m, person.position_m))
                 if ids[-1:] != [track.id]:
                     ids.append(track.id)
-        tracked += any(track.id in ids[-1:] and _distance_m(track, visible[0]) <= GATE_M for track in moment.tracks)
+        tracked += any(track.id in ids[-1:] and distance_m(track.position_m, visible[0].position_m) <= GATE_M
+                       for track in moment.tracks)
     visible_s = _visible_s(visible_ns, [moment.stamp_ns for moment in moments], cameras)
     images = float(max(1, len(visible_ns)))
     return PersonScore(person_id, visible_s, len(errors_m) / images, tracked / images, ids,
@@ -113,9 +114,9 @@ def _person_score(person_id, moments, matches, cameras):
                        max(errors_m, default=float('nan')))
 
 
-def _distance_m(track, person):
+def distance_m(one, other):
     """Distance in the plane."""
-    return np.linalg.norm((track.position_m - person.position_m)[:2])
+    return float(np.hypot(*(np.asarray(one) - other)[:2]))
 
 
 def _visible_s(visible_ns, all_ns, cameras):

@@ -18,7 +18,7 @@ from ros_3d_bb.tracking.association import match_greedily, plane_distances
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import VISIBLE, CameraView, detections_from_boxes
-from ros_3d_bb_lab.evaluation.clear_mot import ClearMatcher, Moment, score
+from ros_3d_bb_lab.evaluation.clear_mot import ClearMatcher, Moment, distance_m, score
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, add_scenarios, scene_name
 from ros_3d_bb_lab.evaluation.text_table import line_of
 from ros_3d_bb_lab.simulation.scenario import read_scenario
@@ -138,11 +138,11 @@ def score_tracks(images, horizons_s=(1.0,)):
         not_visible += sum(person.id in followed and not near.any() for person, near in zip(people, near_m))
         for person, track in matcher.match(people, tracks):
             followed.add(person.id)
-            velocity_errors.append(_distance(track.velocity_mps, person.velocity_mps))
+            velocity_errors.append(distance_m(track.velocity_mps, person.velocity_mps))
             for time_s, errors in prediction_errors.items():
                 predicted_m, true_m = _predicted_m(track, time_s), _predicted_m(person, time_s)
                 if predicted_m is not None and true_m is not None:
-                    errors.append(_distance(predicted_m, true_m))
+                    errors.append(distance_m(predicted_m, true_m))
     scores = {'track_ids': len(track_ids), 'not_visible': not_visible, 'velocity_rmse_mps': _rms(velocity_errors)}
     scores.update({'prediction_%gs_m' % time_s: _rms(errors) for time_s, errors in prediction_errors.items()})
     return scores
@@ -156,7 +156,7 @@ def scored_people(step, camera):
     """
     map_from_camera = step.frame.poses.map_from_camera
     shown = set(person.id for person in step.frame.people if is_in_image(person, map_from_camera, camera)
-                and _distance(person.position_m, map_from_camera[:3, 3]) >= NEAREST_M - ROUNDING_M)
+                and distance_m(person.position_m, map_from_camera[:3, 3]) >= NEAREST_M - ROUNDING_M)
     return [person for person in step.moment.truth if person.id in shown]
 
 
@@ -164,11 +164,6 @@ def _predicted_m(track, time_s):
     """Predicted position (3,) of a track after a time; None if the prediction is shorter."""
     number = int(round(time_s / track.prediction_step_s)) - 1 if len(track.prediction_m) else 0
     return track.prediction_m[number] if number < len(track.prediction_m) else None
-
-
-def _distance(one, other):
-    """Distance in the plane."""
-    return float(np.hypot(*(np.asarray(one) - other)[:2]))
 
 
 def _rms(errors):
