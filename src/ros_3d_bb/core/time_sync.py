@@ -147,8 +147,9 @@ class StampSynchronizer(object):
         depth = self._depths.nearest(stamp_ns, float('inf'))
         if depth is None:
             return ''
-        gap_s = abs(depth.stamp_ns - stamp_ns) / NS
-        if gap_s * NS > self._length_ns:
+        gap_ns = abs(depth.stamp_ns - stamp_ns)
+        gap_s = gap_ns / NS
+        if gap_ns > self._length_ns:
             return ('colour and depth are %.3f s apart at best: depth images are missing, or have stamps of another '
                     'clock' % gap_s)
         return ('colour and depth are %.3f s apart at best; to pair them, set ~stamp_tolerance: %.2f'
