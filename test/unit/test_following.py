@@ -87,8 +87,8 @@ def test_someone_near_is_not_taken_for_a_person_who_is_still_tracked(published, 
 
 @pytest.mark.parametrize('turn_mps, missed_s, followed', [(1.0, 0.0, 3), (1.0, 2.3, 3), (0.1, 0.0, 1)])
 def test_an_id_switch_to_a_person_who_crosses_is_noticed(turn_mps, missed_s, followed):
-    """Track 1 of a person who walks along x goes on across it, and a new one begins where the person is, whom the
-    detector may miss once."""
+    """Track 1 of a person who walks along x goes on across it, and a new one begins where the person is. The detector
+    may miss the person once."""
     selector = TargetSelector()
     for time_s in np.arange(1, 2.01, 0.1):
         selected(selector, time_s, person(1, 2 + 0.7 * time_s, 0, vx=0.7))
@@ -104,8 +104,8 @@ def test_someone_who_comes_to_where_the_person_stood_is_not_the_person():
     selector = TargetSelector()
     for time_s in np.arange(1, 5, 0.1):
         walked_m = max(time_s - 2, 0)
-        newcomer = [person(3, 2, -1.2 + 0.5 * walked_m, vy=0.5, first_s=2.05)] if time_s > 2.3 else []
-        assert selected(selector, time_s, person(1, 2 + walked_m, 0, vx=float(time_s > 2)), *newcomer) == 1
+        stranger = [person(3, 2, -1.2 + 0.5 * walked_m, vy=0.5, first_s=2.05)] if time_s > 2.3 else []
+        assert selected(selector, time_s, person(1, 2 + walked_m, 0, vx=float(time_s > 2)), *stranger) == 1
 
 
 @pytest.mark.parametrize('x, followed', [(4.6, 2), (3.7, 1)])
