@@ -3,7 +3,8 @@
 The times are from the depth image and the 2D boxes to tracks with predictions, without messages and waiting. Estimation
 computes 3D boxes in the camera's frame; tracking transforms them to the fixed frame, tracks them and predicts. The
 people of a measurement session are placed side by side in one wide depth image. Both algorithms process the same image
-and boxes alternately, so that other load on the machine affects both equally and their ratio remains valid.
+and boxes, and take turns in being first, so that other load on the machine and cold caches affect both equally and their
+ratio remains valid.
 """
 import functools
 import itertools
@@ -156,8 +157,10 @@ def _times_ms(crowds, images, random):
     for image in range(len(times_ms)):
         for number, crowd in enumerate(crowds):
             rects_px = crowd.jittered(random)
-            for which, algorithm in enumerate(algorithms[number]):
-                times_ms[image, number, which] = _time_ms(algorithm, crowd.depth, rects_px, image * PERIOD_NS)
+            for turn in range(len(ALGORITHMS)):
+                which = (image + turn) % len(ALGORITHMS)
+                times_ms[image, number, which] = _time_ms(algorithms[number][which], crowd.depth, rects_px,
+                                                          image * PERIOD_NS)
     return times_ms[WARM_UPS:]
 
 
