@@ -13,7 +13,7 @@ from ros_3d_bb.conversions.perception_msgs import time_from, tracks_to_msg
 from ros_3d_bb_lab.evaluation.launching import running
 from support.tracks import track_at
 
-TIMEOUT_S = 20.0
+TIMEOUT_S = 60.0  # to start the pipeline on a busy machine
 
 
 def wait_until(condition, what, timeout_s=TIMEOUT_S):
