@@ -110,6 +110,18 @@ def test_a_person_too_near_for_the_depth_camera_is_not_the_wall(name, nearest_mm
     assert too_near
 
 
+# Found by YOLOv5n: an arm, or half of the trunk.
+@pytest.mark.parametrize('name,image,rect_px', [
+    ('tall', 100, (18, 3, 169, 426)), ('tall', 104, (1, 1, 142, 239)), ('tall', 176, (517, 3, 638, 239)),
+    ('high_mount', 106, (1, 0, 149, 474)), ('high_mount', 116, (1, 4, 92, 429))])
+def test_part_of_a_person_whose_head_is_above_the_image_is_at_its_axis(name, image, rect_px):
+    simulator = Simulator(read_scenario(scenario_path('approach_' + name)))
+    scene = Scene(simulator, simulator.frame(image))
+    box, = scene.boxes([rect_px])
+    assert scene.error_m(scene.frame.people[0], box) < 0.15
+    assert box.rect_px == rect_px
+
+
 @pytest.mark.parametrize('height_m', [0.27, 1.2])
 @pytest.mark.parametrize('ahead_m', [2.0, 3.0, 4.0])
 @pytest.mark.parametrize('wider,lower_edge', [(0, 1), (0, 0.5), (0.15, 1)], ids=['same', 'upper half', 'wider'])

@@ -143,6 +143,8 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     does not include raised arms. If the image border truncates the object, it is completed to the usual size of its
     class. All of this is done in the level frame.
 
+    The rectangle of a person whose head is above the image is widened before (`_widened`).
+
     In the rectangles of nearer objects with plausible boxes, pixels that are not behind them are masked. Rectangles are
     therefore estimated in groups, each after those in front of it. Of several rectangles of one object, only the
     largest gets a box: what remains in the others is background, which continues beyond their left and right sides.
@@ -157,11 +159,12 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
         cannot be undistorted, or if it is a second one of the same object.
     """
     rects_px = list(map(tuple, rects_px))
-    flat_px = without_distortion(rects_px, geometry.camera)
     rays = level_rays(geometry.camera, geometry.level_axes)
     samples, truncated, usable, boxes = [], [], [], [None] * len(rects_px)
     with np.errstate(invalid='ignore'):  # nan: the distortion model has no ray for every pixel
-        for number, rect_px in enumerate(rects_px):
+        whole_px = [_widened(rect_px, depth, kind, rays, geometry) for rect_px, kind in zip(rects_px, kinds)]
+        flat_px = without_distortion(whole_px, geometry.camera)
+        for number, rect_px in enumerate(whole_px):
             truncated.append(truncated_edges(rect_px, geometry.area_px))
             surrounded, least_m = _expected(kinds[number], truncated[number])
             samples.append(RectSamples(depth, rect_px, rays, surrounded, least_m))
@@ -180,6 +183,26 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
                 overlaps.mask_behind(number, int(1000 * axis_m) + BODY_HALF_DEPTH_MM)
             boxes[number] = box
     return boxes
+
+
+def _widened(rect_px, depth, kind, rays, geometry):
+    """The rectangle of a person, wider where the body continues beside it, up to the usual width.
+
+    Of people who are so near that their heads are above the image, detectors often find an arm or half of the trunk.
+    """
+    truncated = truncated_edges(rect_px, geometry.area_px)
+    if kind.group != PERSON or not truncated[1]:
+        return rect_px
+    left, top, right, bottom = rect_px
+    layer = RectSamples(depth, rect_px, rays, _expected(kind, truncated)[0]).layer()
+    missing_px = layer and int(kind.width * geometry.camera.fx / (layer.trunk_mm / 1000)) - (right - left)
+    if not layer or missing_px <= 0:
+        return rect_px
+    area_left, _top, area_right, _bottom = geometry.area_px
+    around_px = max(left - missing_px, area_left), top, min(right + missing_px, area_right), bottom
+    from_px, to_px = RectSamples(depth, around_px, rays, (False, False, False)).columns_of(layer, left, right)
+    share = min(missing_px / max(left - from_px + to_px - right, 1), 1)
+    return left - int(share * (left - from_px)), top, right + int(share * (to_px - right)), bottom
 
 
 def _expected(kind, truncated):
