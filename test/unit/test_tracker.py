@@ -125,6 +125,13 @@ def test_an_end_that_is_sometimes_truncated_does_not_change_the_height():
     assert np.ptp(heights_m) < 0.01
 
 
+def test_the_box_of_a_hand_does_not_raise_a_person_whose_head_is_truncated():
+    """The estimator completes the box of a hand, 0.6 m above the floor, to a body."""
+    hand = at(1.5, 0, cut='top', position_m=np.array([1.5, 0, 0.6 + 1.7 / 2]))
+    track, = play(Tracker(), 1.05, lambda time_s: [at(1.5, 0, cut='top') if time_s < 1 else hand])[-1]
+    assert track.size_m[2] < 1.85 and track.position_m[2] < 1.0
+
+
 @pytest.mark.parametrize('rate_hz,offset_m,from_s,error_m', [
     (30, lambda number: 0.8 * (number % 10 == 9), 0.5, 0.15),  # one box in ten has the depth of the background
     (30, lambda number: 0.4 * (3 <= number < 10), 0.5, 0.2),  # those of a new person, whose velocity is unknown

@@ -237,8 +237,8 @@ class Track(object):
         share, largest = max(SMOOTHING, 1 / self.hits), 1.0
         if cut_left or cut_right:
             share = largest = CUT_SMOOTHING
-        lower_share = 0.0 if is_lower_held else min(max(SMOOTHING, 1 / max(self.lower.hits, 1)), largest)
-        upper_share = 0.0 if is_upper_held else min(max(SMOOTHING, 1 / max(self.upper.hits, 1)), largest)
+        lower_share = 0.0 if is_lower_held else min(max(SMOOTHING, 1 / (self.lower.hits or self.hits)), largest)
+        upper_share = 0.0 if is_upper_held else min(max(SMOOTHING, 1 / (self.upper.hits or self.hits)), largest)
         (width_m, depth_m, height_m), (new_width_m, new_depth_m, new_height_m) = self.size_m, measurement.size_m
         up_m, taller_m = measurement.z - self.z_m, new_height_m - height_m
         lower_m, upper_m = lower_share * (up_m - taller_m / 2), upper_share * (up_m + taller_m / 2)
