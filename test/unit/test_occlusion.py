@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings, strategies as st
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.tracking.occlusion import classify_visibility, depths_towards
-from ros_3d_bb.tracking.track import PRESENT
+from ros_3d_bb.tracking.track import PRESENT, STAYED
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView
 from support.people import mounted
 
@@ -77,6 +77,13 @@ def test_a_person_behind_another_one_is_occluded(others, expected):
     (0.9, 850, PRESENT), (0.6, 550, PRESENT), (0.9, 4000, VISIBLE), (0.9, 0, OUT_OF_VIEW)])
 def test_depth_tells_who_is_occluded_and_who_is_too_near_to_be_detected(x, depth_mm, expected):
     assert place(x, 0, with_depth(np.full((480, 640), depth_mm))) == expected
+
+
+@pytest.mark.parametrize('aside', [-0.1, 0.0, 0.1])
+def test_legs_apart_are_a_person_whose_head_is_above_the_image(aside):
+    depth_mm = np.full((480, 640), 4000)
+    depth_mm[:, 230:300] = depth_mm[:, 350:420] = 850
+    assert place(0.9, aside, with_depth(depth_mm)) in (PRESENT, STAYED)
 
 
 def test_a_pole_before_an_arm_does_not_occlude_the_person():

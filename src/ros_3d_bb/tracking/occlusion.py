@@ -26,7 +26,8 @@ BODY_RADIUS_M = 0.27
 SEEN_BESIDE = 0.2  # an occluding person leaves at most this share of a half width visible: too narrow for a detector
 HIDDEN_BEHIND_M = 0.5  # measured depth nearer than the person by more than this belongs to another object
 HIDDEN_SHARE = 0.5
-ACROSS, ALONG = np.meshgrid((-0.6, 0, 0.6), (-0.8, -0.4, 0, 0.4, 0.8))  # depth sample points, in half extents
+PRESENT_SHARE = 0.3  # of the measured depth; legs fill no more of the width of a body
+ACROSS, ALONG = np.meshgrid((-0.6, -0.3, 0, 0.3, 0.6), (-0.8, -0.4, 0, 0.4, 0.8))  # depth sample points, in half extents
 
 STATUS = {VISIBLE: OCCLUDED, OCCLUDED: OCCLUDED, OUT_OF_VIEW: OUT_OF_VIEW, PRESENT: OCCLUDED,
           STAYED: OCCLUDED, SEEN: VISIBLE}
@@ -62,8 +63,8 @@ def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_p
 
     An occluded person who is predicted to reappear but is not detected is assumed to stay behind the occluder: the
     track keeps its previous position. A person whose place is occupied does not become less certain than `PRESENT_M`,
-    until `PRESENT_NS` after the latest detection, and does not come nearer than what occupies it. A person who walks up
-    to a camera stops before it, as people do in front of a robot.
+    until `PRESENT_NS` after the latest detection, and does not come nearer than what occupies it; who stands stays
+    there. A person who walks up to a camera stops before it, as people do in front of a robot.
 
     `missed` are those of the `tracks` that are not detected; they are predicted to the stamp of the image. `before` are
     the tracks after the previous image. `cameras` maps each camera to its CameraState; `camera` is that of the image,
@@ -73,15 +74,18 @@ def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_p
     occluding = [track for track in tracks if track.is_confirmed and track.missed_s < OCCLUDING_S]
     image, others = cameras[camera], recent_others(cameras, camera, cameras[camera].stamp_ns)
     seen = _visibilities(missed, occluding, image)
-    staying = _staying([track for track in missed if track.status == OCCLUDED and seen[track.id] == VISIBLE], before,
-                       occluding, image)
+    former = _former_visibilities([track for track in missed if seen[track.id] == VISIBLE], before, occluding, image)
+    staying = set(track.id for track in missed if track.status == former.get(track.id) == OCCLUDED)
     seen.update(dict.fromkeys(staying, OCCLUDED))
+    seen.update({track_id: STAYED for track_id, visibility in former.items() if visibility in (PRESENT, STAYED)})
     for name, other in others.items():
         # The person may also stay behind what occludes the view of another camera.
         hidden = [track for track in missed if track.status == track.visibility.get(name) == OCCLUDED
                   and seen[track.id] != VISIBLE]
         there = _visibilities(hidden, occluding, other)
-        staying |= _staying([track for track in hidden if there[track.id] == VISIBLE], before, occluding, other)
+        former = _former_visibilities([track for track in hidden if there[track.id] == VISIBLE], before, occluding,
+                                      other)
+        staying.update(track_id for track_id, visibility in former.items() if visibility == OCCLUDED)
     views = [image.view] + [other.view for other in others.values()]
     for track in missed:
         track.set_visibility(camera, seen[track.id], image.stamp_ns)
@@ -89,7 +93,7 @@ def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_p
         is_there = best in (PRESENT, STAYED)
         if is_there and not (track.is_confirmed and image.stamp_ns - track.last_ns <= PRESENT_NS):
             best, is_there = OUT_OF_VIEW, False
-        if best == STAYED:
+        if best == STAYED or best == PRESENT and not track.is_moving:
             _stop(track, before[track.id].state, math.exp(-observed_s / STOPPING_S))
         elif best == PRESENT:
             track.state = State(*(track.state[:4] + _bounded(track.state, before[track.id].state, PRESENT_M)))
@@ -156,10 +160,10 @@ def _visibilities(tracks, occluding, image):
     return dict(zip([track.id for track in tracks], visibility.tolist()))
 
 
-def _staying(tracks, before, occluding, image):
-    """The IDs of the tracks whose previous position something else occludes in the view of a CameraState."""
-    return set(track.id for track in tracks if OCCLUDED in _visibilities(
-        [before[track.id]], [other for other in occluding if other.id != track.id], image).values())
+def _former_visibilities(tracks, before, occluding, image):
+    """As `_visibilities`, at the previous positions of the tracks, which do not occlude themselves there."""
+    return {track.id: _visibilities([before[track.id]], [other for other in occluding if other.id != track.id],
+                                    image)[track.id] for track in tracks}
 
 
 def _bounded(predicted, former, most_m):
@@ -192,7 +196,7 @@ def classify_visibility(view, positions_m, sizes_m, others_m, max_range_m):
         seen = _in_depth(view, positions_m[undecided], sizes_m[undecided])
         visibility[undecided[seen.hidden & (visibility[undecided] == VISIBLE)]] = OCCLUDED
         visibility[undecided[seen.unknown & (distances_m[undecided] < BLIND_M)]] = OUT_OF_VIEW
-        present = seen.present & (shares[undecided] < RELIABLE_IN_IMAGE)
+        present = seen.present & ~seen.hidden & (shares[undecided] < RELIABLE_IN_IMAGE)
         visibility[undecided[present]] = PRESENT
         visibility[undecided[present & seen.farther]] = STAYED
     return visibility
@@ -267,8 +271,8 @@ def _half_widths(distances_m):
 class _InDepth(NamedTuple):
     """What the depth image shows at the places of people, (n,) bool each.
 
-    Most of the depth measured towards the body is clearly nearer (`hidden`), at its distance (`present`), farther than
-    its axis (`farther`), or clearly farther (`empty`); or none is measured (`unknown`).
+    Most of the depth measured towards the body is clearly nearer (`hidden`), farther than its axis (`farther`), or
+    clearly farther (`empty`); a part is at its distance (`present`); or none is measured (`unknown`).
     """
 
     hidden: np.ndarray
@@ -293,4 +297,6 @@ def _in_depth(view, positions_m, sizes_m):
         each = (behind_m > HIDDEN_BEHIND_M, np.abs(behind_m) <= HIDDEN_BEHIND_M, behind_m < 0,
                 behind_m < -HIDDEN_BEHIND_M)
     counts = np.maximum(known.sum(axis=1), ACROSS.size / 3.0)
-    return _InDepth(*[some.sum(axis=1) > HIDDEN_SHARE * counts for some in each], unknown=~known.any(axis=1))
+    hidden, present, farther, empty = (some.sum(axis=1) / counts for some in each)
+    return _InDepth(hidden > HIDDEN_SHARE, present > PRESENT_SHARE, farther > HIDDEN_SHARE, empty > HIDDEN_SHARE,
+                    ~known.any(axis=1))
