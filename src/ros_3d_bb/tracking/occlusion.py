@@ -27,7 +27,8 @@ SEEN_BESIDE = 0.2  # an occluding person leaves at most this share of a half wid
 HIDDEN_BEHIND_M = 0.5  # measured depth nearer than the person by more than this belongs to another object
 HIDDEN_SHARE = 0.5
 PRESENT_SHARE = 0.3  # of the measured depth; legs fill no more of the width of a body
-ACROSS, ALONG = np.meshgrid((-0.6, -0.3, 0, 0.3, 0.6), (-0.8, -0.4, 0, 0.4, 0.8))  # depth sample points, in half extents
+# Depth sample points, in half extents.
+ACROSS, ALONG = np.meshgrid((-0.6, -0.3, 0, 0.3, 0.6), (-0.8, -0.4, 0, 0.4, 0.8))
 
 STATUS = {VISIBLE: OCCLUDED, OCCLUDED: OCCLUDED, OUT_OF_VIEW: OUT_OF_VIEW, PRESENT: OCCLUDED,
           STAYED: OCCLUDED, SEEN: VISIBLE}

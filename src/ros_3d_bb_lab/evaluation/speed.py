@@ -3,8 +3,8 @@
 The times are from the depth image and the 2D boxes to tracks with predictions, without messages and waiting. Estimation
 computes 3D boxes in the camera's frame; tracking transforms them to the fixed frame, tracks them and predicts. The
 people of a measurement session are placed side by side in one wide depth image. Both algorithms process the same image
-and boxes, and take turns in being first, so that other load on the machine and cold caches affect both equally and their
-ratio remains valid.
+and boxes, and take turns in being first, so that other load on the machine and cold caches affect both equally and
+their ratio remains valid.
 """
 import functools
 import itertools
