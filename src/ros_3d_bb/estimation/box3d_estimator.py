@@ -26,6 +26,7 @@ FEW = 0.2  # share of the samples from which on a layer has more than `LEAST_SHA
 LEAST_SUPPORT = 0.1  # minimum share of the samples with depth in the layer for an estimate; chosen
 TALL_M, ARMS_ABOVE_M = 1.8, 0.04  # chosen: people who appear taller may raise their arms so far above their heads
 LEAST_WIDTH_M = 0.05  # chosen: of a body that is one pixel wide
+ARM_GAP_M = 0.15  # chosen: between an arm and the trunk
 BENT_M = 0.15  # chosen: before a level camera, the ends of people who walk are at most this far from their layer
 LEAST_AHEAD = 0.05  # lower bound of the horizontal part of a ray; chosen
 
@@ -195,12 +196,16 @@ def _widened(rect_px, depth, kind, rays, geometry):
         return rect_px
     left, top, right, bottom = rect_px
     layer = RectSamples(depth, rect_px, rays, _expected(kind, truncated)[0]).layer()
-    missing_px = layer and int(kind.width * geometry.camera.fx / (layer.trunk_mm / 1000)) - (right - left)
-    if not layer or missing_px <= 0:
+    if not layer:
+        return rect_px
+    pixels_per_m = geometry.camera.fx / (layer.trunk_mm / 1000)
+    missing_px = int(kind.width * pixels_per_m) - (right - left)
+    if missing_px <= 0:
         return rect_px
     area_left, _top, area_right, _bottom = geometry.area_px
     around_px = max(left - missing_px, area_left), top, min(right + missing_px, area_right), bottom
-    from_px, to_px = RectSamples(depth, around_px, rays, (False, False, False)).columns_of(layer, left, right)
+    around = RectSamples(depth, around_px, rays, (False, False, False))
+    from_px, to_px = around.columns_of(layer, left, right, int(ARM_GAP_M * pixels_per_m))
     share = min(missing_px / max(left - from_px + to_px - right, 1), 1)
     return left - int(share * (left - from_px)), top, right + int(share * (to_px - right)), bottom
 

@@ -167,17 +167,20 @@ class RectSamples(object):
         """Which samples are on the body of a Layer."""
         return _around(self._ahead_mm, layer.trunk_mm, BODY_HALF_DEPTH_MM)
 
-    def columns_of(self, layer, left, right):
+    def columns_of(self, layer, left, right, gap_px):
         """First column, and the one after the last, of the body of a Layer that continues on both sides of the columns
-        from `left` to before `right`, pixels."""
+        from `left` to before `right`, with gaps of at most `gap_px` pixels."""
         on_body, known = (np.count_nonzero(each.reshape(self.shape), axis=0)
                           for each in (self.on_body(layer), self._ahead_mm < UNKNOWN_MM))
-        columns = self._columns
-        others = np.arange(columns.start, columns.stop, columns.step)[2 * on_body <= known]
-        before, after = others[others < left], others[others >= right]
-        first, _top, end, _bottom = self.rect_px
-        return (min(int(before[-1]) + columns.step, left) if len(before) else first,
-                int(after[0]) if len(after) else end)
+        step = self._columns.step
+        columns = np.arange(self._columns.start, self._columns.stop, step)[2 * on_body > known].tolist()
+        for column in reversed(columns):
+            if left - gap_px <= column + step <= left + step:
+                left = min(column, left)
+        for column in columns:
+            if right - step <= column <= right + gap_px:
+                right = max(column + step, right)
+        return left, right
 
     def share(self, on_body):
         """Share of the weight of all samples, with depth or not, that the given samples have."""
