@@ -6,8 +6,10 @@ import subprocess
 import sys
 
 import pytest
+import rosgraph
 
 from ros_3d_bb_lab.evaluation.launching import free_port, running
+from support.ros import wait_until
 from support.small_session import write_small_session
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
@@ -62,8 +64,10 @@ def test_launch_config_rviz_and_scripts_are_installed(installed):
 @pytest.fixture(scope='module')
 def master():
     port = str(free_port())
+    uri = 'http://localhost:' + port
     with running(['rosmaster', '--core', '-p', port], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL):
-        yield 'http://localhost:' + port
+        wait_until(lambda: rosgraph.is_master_online(uri), 'a master')
+        yield uri
 
 
 @pytest.mark.parametrize('name', NODES)
