@@ -21,10 +21,31 @@ def test_tracks_begin_and_end_after_the_same_time_at_any_rate(rate_hz, speed_mps
     assert len(published_s) == round((published_s[-1] - published_s[0]) * rate_hz) + 1
 
 
-@pytest.mark.parametrize('score,first', [(0.95, 2), (0.5, 2), (0.35, 5), (0.1, None), (0.02, None)])
-def test_the_score_decides_when_a_track_is_published(score, first):
-    published = [len(objects) for objects in play(Tracker(), 1, lambda _time_s: [at(3, 0, score=score)])]
-    assert published == [0] * 30 if first is None else published == [0] * first + [1] * (30 - first)
+@pytest.mark.parametrize('score,first,later', [
+    (0.95, 2, 2), (0.5, 2, 2), (0.35, 2, 5), (0.1, None, None), (0.02, None, None)])
+def test_the_score_decides_when_a_track_is_published(score, first, later):
+    """Of people in the first image of the camera, and of those who come into view later."""
+    for arrival_s, images in ((0, first), (1, later)):
+        published = [len(objects) for objects in play(
+            Tracker(), arrival_s + 1, lambda time_s: [at(3, 0, score=score)] if time_s >= arrival_s else [])]
+        empty = len(published) if images is None else 30 * arrival_s + images
+        assert published == [0] * empty + [1] * (len(published) - empty)
+
+
+@pytest.mark.parametrize('rate_hz', [4, 5, 10])
+def test_fewer_weak_boxes_start_a_track_at_low_rates(rate_hz):
+    """More people come into view between two images, but not more false boxes."""
+    walk = play(Tracker(), 4, lambda time_s: [at(3, 0, score=0.35)] if time_s >= 2 else [], rate_hz)
+    first_s = [number / rate_hz for number, objects in enumerate(walk) if objects][0] - 2
+    assert first_s == pytest.approx(max(0.2, 1 / rate_hz))
+
+
+def test_people_after_a_gap_in_the_images_count_as_arrived_meanwhile():
+    """Boxes that need five images without the gap."""
+    tracker = Tracker()
+    play(tracker, 1, standing())
+    after = play(tracker, 0.2, lambda _time_s: [at(3, 0, score=0.35)], start_s=2)
+    assert [len(objects) for objects in after] == [0, 0, 1, 1, 1, 1]
 
 
 @pytest.mark.parametrize('rate_hz', [5, 60])

@@ -7,7 +7,7 @@ from scipy.optimize import linear_sum_assignment
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.kalman_filter import as_outlier, weighted
-from ros_3d_bb.tracking.track import MIN_TRACK_SCORE, Track, log_odds_of
+from ros_3d_bb.tracking.track import MIN_TRACK_SCORE, Track, log_odds_of, log_odds_of_arrival
 
 RECENT_NS = 6 * NS // 10  # tracks matched less than this ago are associated before the others; chosen
 UNSURE_SHARE = 0.1  # upper bound of the new-target density, relative to the peak density of the detection; chosen
@@ -182,25 +182,26 @@ def _assigned(costs):
     return [pair for pair in ((rows[row], columns[column]) for row, column in found) if pair in costs]
 
 
-def initiate(tracks, unmatched, image, params, rules, assign_id):
+def initiate(tracks, unmatched, image, period_s, params, rules, assign_id):
     """Start tracks from the unmatched measurements of an image, except those with little support or a low score, and
     duplicate detections of recently matched or new tracks of the same group of classes. Returns the new tracks.
 
-    `params` are `tracker.TrackerParams`, `rules` the `track.Rules`; assign_id(number) returns the ID of the track that
-    the detection of this number starts.
+    `period_s` is the time since the previous image of the camera, None for its first one. `params` are
+    `tracker.TrackerParams`, `rules` the `track.Rules`; assign_id(number) returns the ID of the track that the detection
+    of this number starts.
     """
-    stamp_ns, camera = image.stamp_ns, image.view.camera
+    stamp_ns, camera, arrival_log_odds = image.stamp_ns, image.view.camera, log_odds_of_arrival(period_s)
     new, occupied = [], [(track.state.x, track.state.y, track.kind.group) for track in tracks
                          if stamp_ns - track.last_ns < RECENTLY_MATCHED_NS]
     for measurement in unmatched:
         detection, kind, x, y = measurement.detection, measurement.kind, measurement.x, measurement.y
-        is_likely = log_odds_of(detection.score, rules.even_log_odds) > MIN_TRACK_SCORE
+        log_odds = log_odds_of(detection.score, rules.even_log_odds)
         is_duplicate = any(math.hypot(other_x - x, other_y - y) < params.duplicate_distance and group == kind.group
                            for other_x, other_y, group in occupied)
-        if is_likely and detection.support >= STARTING_SUPPORT and not is_duplicate:
+        if log_odds > MIN_TRACK_SCORE and detection.support >= STARTING_SUPPORT and not is_duplicate:
             occupied.append((x, y, kind.group))
             new.append(Track(assign_id(measurement.number), measurement, stamp_ns, camera,
-                             params.initial_speed * kind.known.initial_speed, rules.even_log_odds))
+                             params.initial_speed * kind.known.initial_speed, log_odds + arrival_log_odds))
     return new
 
 

@@ -5,6 +5,9 @@ log-likelihood ratios of its detections and misses (Sittler 1964; Blackman and P
 Tracking Systems, 1999, 6.2). Those of successive images are not independent: detectors repeat their errors. An image
 therefore counts in proportion to the time since the previous one, and fully after a correlation time: at high image
 rates, the score depends on the time and not on the number of images.
+
+A track starts with the log odds of its first detection and of an arrival: the number of people who come into view
+between two images grows with the time between them, the number of independent false detections of an image does not.
 """
 import functools
 import math
@@ -20,6 +23,8 @@ from ros_3d_bb.tracking.types import (NOT_DETECTED, OUT_OF_VIEW, PREDICTION_STEP
 
 # All are chosen; `./run bench tracking` and `./run bench scenes` show the effect of others.
 HIT_CORRELATION_S = 0.08  # without scores, three images at 30 Hz or two independent ones confirm a track by default
+CONFIRMING_NS = 6 * NS // 100  # detections of less time than three images at 30 Hz confirm no track
+ARRIVAL_S = 1.0  # people in the first image of a camera have arrived before: during this time, as after longer gaps
 OUTLIER_CORRELATION_S = 0.2  # boxes of the same kind, such as outliers, follow each other; chosen
 LEAST_MISPLACED = -5.0  # of the log odds that outliers have moved a track: earlier boxes are forgotten; chosen
 MISS_CORRELATION_S = 0.15  # the causes of misses, such as poses and partial occlusion, last longer
@@ -132,8 +137,10 @@ class Track(object):
     track.
     """
 
-    def __init__(self, track_id, measurement, stamp_ns, camera, speed_mps, even_log_odds):
-        """Start a track; its velocity is unknown, with the standard deviation `speed_mps` along each axis."""
+    def __init__(self, track_id, measurement, stamp_ns, camera, speed_mps, log_odds):
+        """Start a track with a track score; the velocity is unknown, with the standard deviation `speed_mps` along each
+        axis.
+        """
         detection, speed_m2 = measurement.detection, speed_mps ** 2
         self.id, self.kind, self.score, self.detection = track_id, measurement.kind, detection.score, detection.index
         self.state = kalman_filter.State(measurement.x, measurement.y, 0.0, 0.0, measurement.xx, measurement.xy, 0.0,
@@ -146,7 +153,7 @@ class Track(object):
         self.status, self.innovation_m = VISIBLE, (0.0, 0.0)
         self.visibility, self.since_ns = {camera: SEEN}, {camera: stamp_ns}
         self.slow_mps, self.misplaced = (0.0, 0.0), 0.0
-        self.log_odds, self.is_confirmed, self.is_moving = log_odds_of(detection.score, even_log_odds), False, False
+        self.log_odds, self.is_confirmed, self.is_moving = log_odds, False, False
         self.votes = {measurement.kind.label: _vote(detection.score)}
 
     def predicted(self, elapsed_s, acceleration):
@@ -180,7 +187,8 @@ class Track(object):
         # At least that of a new track: an object may be where false detections were (as in Page's test, 1954).
         total = max(self.log_odds + min(period_s / HIT_CORRELATION_S, 1) * (log_odds + HIT), log_odds)
         self.log_odds = min(total, MAX_TRACK_SCORE)
-        self.is_confirmed = self.is_confirmed or self.log_odds >= rules.confirming_log_odds
+        is_repeated = stamp_ns - self.first_ns >= CONFIRMING_NS
+        self.is_confirmed = self.is_confirmed or is_repeated and self.log_odds >= rules.confirming_log_odds
         self.hits, self.last_ns, self.unseen_s, self.missed_s = self.hits + 1, stamp_ns, 0.0, 0.0
         self.status, self.detection = VISIBLE, detection.index
         limit_mps = rules.moving_speed * (STILL_MOVING if self.is_moving else 1)
@@ -285,6 +293,15 @@ def log_odds_of(score, even_log_odds):
     """
     log_odds = _logit(min(score if score > 0 else UNKNOWN_SCORE, LARGEST_SCORE)) - even_log_odds
     return min(max(log_odds, MIN_LOG_ODDS), MAX_LOG_ODDS)
+
+
+def log_odds_of_arrival(period_s):
+    """Log odds that a new detection shows a person who has come into view in the time `period_s` since the previous
+    image of the camera, None for its first one, relative to those after `HIT_CORRELATION_S`. After less, new false
+    detections are rarer, too, as those of the previous image repeat.
+    """
+    arrival_s = ARRIVAL_S if period_s is None else min(max(period_s, HIT_CORRELATION_S), ARRIVAL_S)
+    return math.log(arrival_s / HIT_CORRELATION_S)
 
 
 def _logit(probability):

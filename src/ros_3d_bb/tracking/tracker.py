@@ -212,7 +212,8 @@ class Tracker(TrackerBase):
             camera_m = image.view.fixed_from_camera[:2, 3]
             unmatched = [measurement for measurement in measurements if measurement.number not in taken
                          and not self.ignored.contains((measurement.x, measurement.y), camera_m)]
-            tracks += initiate(tracks, unmatched, image, self._params[0], self._rules, assign_id)
+            period_s = camera.period_s if camera.previous else None
+            tracks += initiate(tracks, unmatched, image, period_s, self._params[0], self._rules, assign_id)
         misfit_ns = image.stamp_ns if fits is False else before.misfit_ns
         totals = Totals(before.totals.common_motions + is_moved, before.totals.untracked_boxes + untracked_boxes)
         state = _State(tracks, image.stamp_ns, cameras, misfit_ns, moved_ns, log_noise_scale, totals)
