@@ -5,6 +5,7 @@ import pytest
 
 from ros_3d_bb.tracking.types import OUT_OF_VIEW, VISIBLE
 from ros_3d_bb_lab.evaluation import __main__ as command
+from ros_3d_bb_lab.evaluation.tracking.prediction_benchmark import scores_of
 from ros_3d_bb_lab.evaluation.tracking.recorded_detections import START_NS, read_recordings
 from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S
 from support.tracks import track_at
@@ -86,3 +87,12 @@ def test_the_command_writes_scores_by_kind(tmp_path):
     assert set(scores['rates']) == {'30', '15', '10', '5', '3'}
     assert scores['rates']['10']['true']['ours_fde_2s_m'] == scores['ours_fde_2s_m'] < 0.1
     assert scores['rates']['10']['noise_5cm']['ours_fde_2s_m'] > scores['ours_fde_2s_m']
+    assert scores['standing'] == 0 and scores['standing_coverage_95_2s'] is None
+
+
+def test_people_who_stand_are_scored_separately():
+    """Of one who stands for 2 s: from 0.7 s on."""
+    starting_m = np.column_stack((1.2 * np.maximum(TIMES_S - 2, 0), np.zeros(len(TIMES_S))))
+    scores = scores_of([(TIMES_S, starting_m)], 10)
+    assert 12 <= scores['standing'] <= 16
+    assert scores['standing_coverage_95_2s'] < scores['coverage_95_2s']
