@@ -146,6 +146,20 @@ def test_an_end_that_is_sometimes_truncated_does_not_change_the_height():
     assert np.ptp(heights_m) < 0.01
 
 
+def test_a_truncated_box_that_ends_inside_the_image_does_not_stop_a_walking_person():
+    """Head and feet come out of the image, and the detector draws the upper edge a few pixels below the border."""
+    def walking(time_s):
+        x = 3.5 - time_s
+        if time_s < 1:
+            return [at(x, 0, sigma=0.12)]
+        if time_s < 1.5:
+            return [at(x, 0, sigma=0.12, cut='top bottom', height=0.9, position_m=np.array([x, 0, 0.6]))]
+        return [at(x, 0, sigma=0.12, cut='bottom', position_m=np.array([x, 0, 1.0 - 1.7 / 2]))]
+
+    track, = play(Tracker(), 1.75, walking, rate_hz=10)[-1]
+    assert track.velocity_mps[0] == pytest.approx(-1, abs=0.1)
+
+
 def test_the_box_of_a_hand_does_not_raise_a_person_whose_head_is_truncated():
     """The estimator completes the box of a hand, 0.6 m above the floor, to a body."""
     hand = at(1.5, 0, cut='top', position_m=np.array([1.5, 0, 0.6 + 1.7 / 2]))
