@@ -111,3 +111,11 @@ def test_a_person_after_a_gap_between_images_gets_a_new_id(gap_s, y):
     tracker = Tracker()
     before, after = (play(10, 1.0, lambda _time_s: [(4.0, y)], tracker, start_s) for start_s in (0.0, gap_s))
     assert after[-1] and not all_ids(before) & all_ids(after)
+
+
+@pytest.mark.parametrize('rate_hz', [3, 5, 10])
+def test_people_who_walk_on_while_they_bend_keep_their_velocity(rate_hz):
+    tracks = play(rate_hz, 3.0, lambda time_s: [(3.0, time_s - 2, 1.7 if time_s < 2 else 1.1)])
+    assert all_ids(tracks) == {1}
+    for track, in tracks[2 * rate_hz:]:
+        assert track.velocity_mps[1] == pytest.approx(1, abs=0.3)

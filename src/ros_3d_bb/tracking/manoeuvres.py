@@ -31,9 +31,10 @@ LONGEST_NS = NS  # between two images; chosen: after longer, anyone may be withi
 def match_manoeuvres(tracks, measurements, matches, latest_ns, stamp_ns, height_sigma_m):
     """The pairs (Track, Measurement) outside of the gate that have no other candidates.
 
-    `matches` are those of the association, `latest_ns` is the stamp of the latest image of the camera. The velocities
-    of the tracks become as uncertain as their motion to the measurement. The motion starts at rest at the latest box: a
-    wrong velocity must not lead away from boxes that agree. At high rates, both boxes may be outliers.
+    `matches` are those of the association, `latest_ns` is the stamp of the latest image of the camera. The velocities of
+    the tracks become as uncertain as their motion to the measurement. Unless this is nearer to the prediction, as of
+    people who bend while they walk, the motion starts at rest at the latest box: a wrong velocity must not lead away
+    from boxes that agree. At high rates, both boxes may be outliers.
     """
     earliest_ns = max(min(latest_ns, stamp_ns - RECENT_NS), stamp_ns - LONGEST_NS)
     seen = [track for track in tracks if earliest_ns <= track.last_ns < stamp_ns]
@@ -52,9 +53,12 @@ def match_manoeuvres(tracks, measurements, matches, latest_ns, stamp_ns, height_
                 pairs.append((track, near[0]))
     for track, measurement in pairs:
         elapsed_s = (stamp_ns - track.last_ns) / NS
-        speed_mps = max(_distance_m(track, measurement) - BESIDE_M, 0) / elapsed_s
-        if elapsed_s >= HIT_CORRELATION_S:
+        shift_m, is_slow = _distance_m(track.latest, measurement), elapsed_s >= HIT_CORRELATION_S
+        if is_slow and _distance_m(track.state, measurement) < shift_m:
+            shift_m = _distance_m(track.state, measurement)
+        elif is_slow:
             track.state = track.state._replace(x=track.latest.x, y=track.latest.y, u=0.0, v=0.0)
+        speed_mps = max(shift_m - BESIDE_M, 0) / elapsed_s
         track.state = faster(track.state, elapsed_s, speed_mps ** 2)
     return pairs
 
@@ -73,9 +77,9 @@ def _is_within_reach(track, measurement, stamp_ns, may_move, height_sigma_m):
         rise_m = min(RISING_MPS * elapsed_s, MOST_RISE_M) + BESIDE_SIGMAS * height_sigma_m
         is_similar = track.is_confirmed and abs(box.head_m - track.latest.head_m) < rise_m
     speed_mps = moving_mps if may_move else STOPPED * walking_mps
-    return is_similar and _distance_m(track, box) < speed_mps * elapsed_s + BESIDE_M
+    return is_similar and _distance_m(track.latest, box) < speed_mps * elapsed_s + BESIDE_M
 
 
-def _distance_m(track, box):
-    """Distance of a box from the latest one of a track."""
-    return math.hypot(box.x - track.latest.x, box.y - track.latest.y)
+def _distance_m(place, box):
+    """Distance of a box from a place in the plane."""
+    return math.hypot(box.x - place.x, box.y - place.y)
