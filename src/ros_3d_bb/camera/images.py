@@ -52,18 +52,17 @@ class DepthImage(NamedTuple):
         """
         if self.area_px is not None:
             return self.area_px
-        height, width = self.values.shape
+        columns, rows = self.values[::BORDER_STEP].T, self.values[:, ::BORDER_STEP]
+        borders = []
         with np.errstate(invalid='ignore'):  # nan
-            left, right = _black_ends(self.values[::BORDER_STEP].T)
-            top, bottom = _black_ends(self.values[:, ::BORDER_STEP])
-        return left, top, width - right, height - bottom
-
-
-def _black_ends(lines):
-    """Number of lines without depth at both ends of an array (lines, pixels); 0 if there are more than the widest."""
-    widest = int(WIDEST_BORDER * len(lines))
-    first, last = lines[:widest + 1], lines[:-widest - 2:-1]
-    return int((first > 0).any(axis=1).argmax()), int((last > 0).any(axis=1).argmax())
+            for lines in (columns, rows, columns[::-1], rows[::-1]):
+                border = 0
+                if not np.count_nonzero(lines[0] > 0):
+                    outer = lines[:int(WIDEST_BORDER * len(lines)) + 1]
+                    border = int((outer > 0).any(axis=1).argmax())
+                borders.append(border)
+        left, top, right, bottom = borders
+        return left, top, len(columns) - right, len(rows) - bottom
 
 
 class RgbdFrame(NamedTuple):
