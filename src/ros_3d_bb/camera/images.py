@@ -58,8 +58,8 @@ class DepthImage(NamedTuple):
             for lines in (columns, rows, columns[::-1], rows[::-1]):
                 border = 0
                 if not np.count_nonzero(lines[0] > 0):
-                    outer = lines[:int(WIDEST_BORDER * len(lines)) + 1]
-                    border = int((outer > 0).any(axis=1).argmax())
+                    has_depth = lines[:int(WIDEST_BORDER * len(lines)) + 1] > 0
+                    border = int(has_depth.argmax()) // has_depth.shape[1]
                 borders.append(border)
         left, top, right, bottom = borders
         return left, top, len(columns) - right, len(rows) - bottom

@@ -162,17 +162,20 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     rects_px = list(map(tuple, rects_px))
     rays = level_rays(geometry.camera, geometry.level_axes)
     samples, truncated, usable, boxes = [], [], [], [None] * len(rects_px)
-    with np.errstate(invalid='ignore'):  # nan: the distortion model has no ray for every pixel
-        whole_px = [_widened(rect_px, depth, kind, rays, geometry) for rect_px, kind in zip(rects_px, kinds)]
-        flat_px = without_distortion(whole_px, geometry.camera)
-        for number, rect_px in enumerate(whole_px):
-            truncated.append(truncated_edges(rect_px, geometry.area_px))
-            surrounded, least_m = _expected(kinds[number], truncated[number])
-            samples.append(RectSamples(depth, rect_px, rays, surrounded, least_m))
-            rows, columns = samples[number].shape
-            has_depth = samples[number].measured >= max(LEAST_MEASURED * rows * columns, 1)
-            if has_depth and math.isfinite(sum(flat_px[number])):
-                usable.append(number)
+    for rect_px, kind in zip(rects_px, kinds):
+        edges = truncated_edges(rect_px, geometry.area_px)
+        if kind.group == PERSON and edges[1]:
+            rect_px = _widened(rect_px, edges, depth, kind, rays, geometry)
+            edges = truncated_edges(rect_px, geometry.area_px)
+        surrounded, least_m = _expected(kind, edges)
+        samples.append(RectSamples(depth, rect_px, rays, surrounded, least_m))
+        truncated.append(edges)
+    flat_px = without_distortion([each.rect_px for each in samples], geometry.camera)
+    for number, each in enumerate(samples):
+        rows, columns = each.shape
+        has_depth = each.measured >= max(LEAST_MEASURED * rows * columns, 1)
+        if has_depth and math.isfinite(sum(flat_px[number])):
+            usable.append(number)
     overlaps = Overlaps(samples, usable, geometry.camera, kinds, truncated)
     while overlaps.pending:
         for number in overlaps.take_foremost():
@@ -186,14 +189,11 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     return boxes
 
 
-def _widened(rect_px, depth, kind, rays, geometry):
+def _widened(rect_px, truncated, depth, kind, rays, geometry):
     """The rectangle of a person, wider where the body continues beside it, up to the usual width.
 
     Of people who are so near that their heads are above the image, detectors often find an arm or half of the trunk.
     """
-    truncated = truncated_edges(rect_px, geometry.area_px)
-    if kind.group != PERSON or not truncated[1]:
-        return rect_px
     left, top, right, bottom = rect_px
     layer = RectSamples(depth, rect_px, rays, _expected(kind, truncated)[0]).layer()
     if not layer:
