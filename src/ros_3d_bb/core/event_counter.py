@@ -19,7 +19,8 @@ class EventCounter(object):
 
     def count(self, event, amount=1):
         """Count an expected event."""
-        self.count_all({event: amount})
+        with self._lock:
+            self.counts[event] = self.counts.get(event, 0) + amount
 
     def count_all(self, amounts):
         """Count several events at once; `amounts` maps each event to its number."""

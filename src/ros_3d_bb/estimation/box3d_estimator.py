@@ -112,7 +112,10 @@ def estimate_boxes(depth, rects_px, camera, estimator, level_from_camera=LEVEL, 
     labels = list(map(estimator.classes.standard_name, labels or [PERSON] * len(rects_px)))
     geometry = ImageGeometry(camera, depth.measured_area(), tuple(map(tuple, level_from_camera.tolist())))
     boxes = estimator.estimate(depth, rects_px, geometry, list(map(estimator.classes.of, labels)))
-    return [box and (box if label == box.label else box._replace(label=label)) for box, label in zip(boxes, labels)]
+    for number, label in enumerate(labels):
+        if boxes[number] is not None and label != PERSON:
+            boxes[number] = boxes[number]._replace(label=label)
+    return boxes
 
 
 def level_rotation(up):
@@ -255,17 +258,21 @@ def _visible_extents(samples, flat_px, geometry, may_repeat):
         return None
     # The mean without the nearest and the farthest tenth is finer than the median, which has the depth resolution.
     layer_m = layer.mean_mm(layer.first + count // 10, layer.end - count // 10) / 1000
-    upper, lower = slopes_down(flat_px, geometry)
+    upper_m, lower_m = samples.ends(on_body)
     looks_down = geometry.level_axes[1][2] > LOOKS_DOWN
     # Before a level camera, the distances of the ends hardly matter unless the person bends; the mean is less noisy.
-    upper_m, lower_m = [end_m if looks_down or abs(end_m - layer_m) > BENT_M else layer_m
-                        for end_m in samples.ends(on_body)]
-    top_m, bottom_m = upper_m * upper, lower_m * lower
+    if not looks_down and abs(upper_m - layer_m) <= BENT_M:
+        upper_m = layer_m
+    if not looks_down and abs(lower_m - layer_m) <= BENT_M:
+        lower_m = layer_m
+    left_px, top_px, right_px, bottom_px = flat_px
+    middle_px = (left_px + right_px) / 2.0
+    top_m = upper_m * slope_down(middle_px, top_px, geometry)
+    bottom_m = lower_m * slope_down(middle_px, bottom_px, geometry)
     left_m, right_m, trunk_m = samples.edges(on_body, bottom_m - FEET_M if looks_down else None)
     if bottom_m - top_m > TALL_M:
-        left_px, top_px, right_px, bottom_px = flat_px
-        head_px = left_px, top_px + samples.pixels_above_head(on_body, trunk_m, layer_m), right_px, bottom_px
-        head_m = layer_m * slopes_down(head_px, geometry)[0]
+        head_px = top_px + samples.pixels_above_head(on_body, trunk_m, layer_m)
+        head_m = layer_m * slope_down(middle_px, head_px, geometry)
         top_m = head_m if head_m - top_m > ARMS_ABOVE_M else top_m
     return _Extents(left_m, right_m, trunk_m, top_m, bottom_m, layer_m, support)
 
@@ -299,10 +306,8 @@ def complete_truncated_extent(low, high, cut_low, cut_high, usual):
     return low, high + (missing if cut_high and not cut_low else 0.0)
 
 
-def slopes_down(flat_px, geometry):
-    """y / z in the level frame of the rays through the middles of the upper and of the lower edge of a rectangle."""
-    camera, (x1, y1, x2, y2) = geometry.camera, flat_px
-    _across, (down_x, down_y, down_z), (ahead_x, ahead_y, ahead_z) = geometry.level_axes
-    x = ((x1 + x2) / 2.0 - camera.cx) / camera.fx
-    return [(down_x * x + down_y * y + down_z) / max(ahead_x * x + ahead_y * y + ahead_z, LEAST_AHEAD)
-            for y in ((y1 - camera.cy) / camera.fy, (y2 - camera.cy) / camera.fy)]
+def slope_down(u, v, geometry):
+    """y / z in the level frame of the ray through an undistorted position (u, v), pixels."""
+    camera, (_across, (down_x, down_y, down_z), (ahead_x, ahead_y, ahead_z)) = geometry.camera, geometry.level_axes
+    x, y = (u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy
+    return (down_x * x + down_y * y + down_z) / max(ahead_x * x + ahead_y * y + ahead_z, LEAST_AHEAD)

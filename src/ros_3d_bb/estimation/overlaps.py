@@ -1,4 +1,6 @@
 """Occlusion: order of the objects in overlapping rectangles by depth, and masks of what nearer ones show in them."""
+import collections
+
 from ros_3d_bb.estimation.depth_samples import BODY_HALF_DEPTH_MM, LEAST_SIZE, UNKNOWN_MM
 
 # All are chosen; test_difficult_views.py checks them.
@@ -33,7 +35,7 @@ class Overlaps(object):
         self.pending = set(usable)  # without an estimate yet
         self._changed = set(usable)  # since the layer was determined
         self._shared_px = _shared_areas(usable, samples)  # with each pending rectangle that overlaps another one
-        self._nearer = {number: set() for number in usable}  # pending rectangles of nearer objects that overlap it
+        self._nearer = collections.defaultdict(set)  # pending rectangles of nearer objects that overlap it
         self._layers_m, self._beside_m, self._ties = {}, {}, 0
         self.repeats = set()  # may be of the object of a larger rectangle
 
@@ -47,10 +49,11 @@ class Overlaps(object):
         smaller, as a person on a couch.
         """
         self._update()
-        occluders, most = {number: len(self._nearer[number]) for number in self.pending}, len(self.pending) // MANY
-        foremost = [number for number in occluders if occluders[number] <= most]
-        if occluders and min(occluders.values()) > 0:  # three or more occlude each other in a circle
-            foremost = [max(occluders, key=lambda number: (self._lowest_px[number], self._areas_px[number], -number))]
+        most = len(self.pending) // MANY
+        foremost = [number for number in self.pending if len(self._nearer[number]) <= most]
+        if self.pending and not foremost:  # three or more occlude each other in a circle
+            foremost = [max(self.pending,
+                            key=lambda number: (self._lowest_px[number], self._areas_px[number], -number))]
         for number in foremost:
             self._remove(number)
         return foremost
@@ -136,7 +139,7 @@ class Overlaps(object):
 def _shared_areas(usable, samples):
     """Areas that rectangles share with each other one that they overlap, pixels: {number: {other: area}}."""
     by_left = sorted([samples[number].rect_px + (number,) for number in usable])
-    shared_px = {number: {} for number in usable}
+    shared_px = collections.defaultdict(dict)
     for rank, (_left, top, right, bottom, number) in enumerate(by_left):
         for other_left, other_top, other_right, other_bottom, other in by_left[rank + 1:]:
             if other_left >= right or len(shared_px[number]) >= MANY:

@@ -67,12 +67,13 @@ class Bbox3dNode(object):
         with self._diagnostics.rejecting('2D boxes'):
             frame = self._inputs.source.frame(boxes2d, depth_msg, camera)
             boxes3d = self._stage.estimate(frame, boxes2d)
-            message = boxes3d_to_msg(boxes3d, header_of(frame), frame.received.camera)
+            received = frame.received
+            message = boxes3d_to_msg(boxes3d, header_of(received), received.camera)
             self._boxes_pub.publish(message)
             self._diagnostics.record_latency(message.header.stamp)
             if self._next_stage is not None:
                 self._next_stage(message)
-            self._images.publish(message.header, frame, boxes3d)
+            self._images.publish(message.header, received.depth, boxes3d)
 
 
 class DepthCameraCheck(object):
@@ -139,15 +140,14 @@ class SampleImages(object):
         # In a separate thread, because an unresponsive master must not block the 3D boxes.
         self._subscription = NewestWorker(self._subscribe, self._on_error)
 
-    def publish(self, header, frame, boxes):
-        """Publish the debug images of the 3D boxes of an RgbdFrame on the topics that have subscribers."""
+    def publish(self, header, depth, boxes):
+        """Publish the debug images of the 3D boxes in a received depth image on the topics that have subscribers."""
         needs_raw, needs_color = self._raw_pub.get_num_connections() > 0, self._color_pub.get_num_connections() > 0
         needs_depth = self._depth_pub.get_num_connections() > 0
         if (needs_raw or needs_color) != (self._unsubscribe is not None):
             self._subscription.offer(needs_raw or needs_color)
         if not (needs_raw or needs_color or needs_depth):
             return
-        depth = frame.received.depth
         if needs_depth:
             grey = depth_to_grey(depth, self.depth_range_m)
             self._depth_pub.publish(fill_image(Image(header=header), grey, 'mono8'))

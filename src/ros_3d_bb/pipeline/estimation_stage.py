@@ -82,12 +82,13 @@ class EstimationStage(object):
         rects_px = list(map(tuple, frame.upright_rects(usable.boxes).tolist()))
         estimates = estimate_boxes(frame.depth, rects_px, frame.camera, self.estimator, _level_rotation(frame.up),
                                    usable.labels)
-        found = [box._replace(score=score) for box, score in zip(estimates, usable.scores.tolist())
-                 if box is not None]
-        boxes3d = []
-        for box in found:
+        found, boxes3d = [], []
+        for box, score in zip(estimates, usable.scores.tolist()):
+            if box is None:
+                continue
+            found.append(box)
             if box.is_plausible:
-                boxes3d.append(box)
+                boxes3d.append(box._replace(score=score))
             else:
                 self._warn_of_size(_as_received(box, frame))
         self._check_scale(found, frame.depth_unit_m)
@@ -157,7 +158,9 @@ class ScaleCheck(object):
             Factor by which depth must be multiplied to give people the usual height; a common factor if one is near.
             None if the heights are possible or too few. After a factor, new people are collected.
         """
-        self._heights_m.extend(float(box.size_m[1]) for box in boxes if _shows_standing_person(box))
+        for box in boxes:
+            if _shows_standing_person(box):
+                self._heights_m.append(float(box.size_m[1]))
         if len(self._heights_m) < LATEST_PEOPLE:
             return None
         lower_m, median_m, upper_m = sorted(self._heights_m)[LATEST_PEOPLE // 4::LATEST_PEOPLE // 4]
