@@ -19,8 +19,7 @@ class EventCounter(object):
 
     def count(self, event, amount=1):
         """Count an expected event."""
-        with self._lock:
-            self.counts[event] = self.counts.get(event, 0) + amount
+        self.count_all({event: amount})
 
     def count_all(self, amounts):
         """Count several events at once; `amounts` maps each event to its number."""

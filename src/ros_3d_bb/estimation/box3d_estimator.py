@@ -257,7 +257,8 @@ def _visible_extents(samples, flat_px, geometry, may_repeat):
     if may_repeat and samples.fill_sides(on_body):
         return None
     # The mean without the nearest and the farthest tenth is finer than the median, which has the depth resolution.
-    layer_m = layer.mean_mm(layer.first + count // 10, layer.end - count // 10) / 1000
+    inner_mm = layer.ordered_mm[layer.first + count // 10:layer.end - count // 10]
+    layer_m = int(inner_mm.sum()) / (1000 * len(inner_mm))
     upper_m, lower_m = samples.ends(on_body)
     looks_down = geometry.level_axes[1][2] > LOOKS_DOWN
     # Before a level camera, the distances of the ends hardly matter unless the person bends; the mean is less noisy.

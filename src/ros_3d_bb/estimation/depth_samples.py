@@ -71,10 +71,6 @@ class Layer(NamedTuple):
     end: int
     ordered_mm: np.ndarray
 
-    def mean_mm(self, first, end):
-        """Mean of the distances from the rank `first` to before `end`."""
-        return int(self.ordered_mm[first:end].sum()) / (end - first)
-
 
 class RectSamples(object):
     """Samples of the visible part of a rectangle in the level frame, each an element of flat arrays.
@@ -101,7 +97,7 @@ class RectSamples(object):
         self._weights = (_ROW_WEIGHTS[self.shape[0]] * _column_weights(self._columns.start - left, right - left,
                                                                        self._columns.step, self.shape[1])).ravel()
         self._outline = _outline(self.shape, surrounded)
-        self._layer = self._layer_in(self._ahead_mm)
+        self._layer = None  # not known, or all samples are masked
 
     def _along(self, axis):
         """Positions along an axis of the level frame, metres."""

@@ -91,7 +91,9 @@ class EstimationStage(object):
                 boxes3d.append(box._replace(score=score))
             else:
                 self._warn_of_size(_as_received(box, frame))
-        self._check_scale(found, frame.depth_unit_m)
+        factor = self._scale_check.factor(found)
+        if factor is not None:
+            self._warn_of_scale(factor, frame.depth_unit_m)
         counts = {'boxes estimated': len(boxes3d), 'boxes without depth': len(estimates) - len(found)}
         boxes3d = corrected_boxes(boxes3d, self._error_model, abs(frame.stamp_ns - frame.depth_stamp_ns) / NS)
         if self._error_model is not None and boxes3d:
@@ -106,13 +108,10 @@ class EstimationStage(object):
                           'high at %.3g m; less than %g m expected; the others in this image are used'
                           % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2], box.largest_m)))
 
-    def _check_scale(self, boxes3d, unit_m):
-        """Warn if people have impossible heights, with the scale that makes them possible."""
-        factor = self._scale_check.factor(boxes3d)
-        if factor is not None:
-            self._events.warn('depth of a wrong scale', 'people of impossible height: depth must be multiplied by %g; '
-                              'set ~depth_scale: %g (now %g); 3D boxes are wrong or missing until then'
-                              % (factor, factor * unit_m, unit_m))
+    def _warn_of_scale(self, factor, unit_m):
+        self._events.warn('depth of a wrong scale', 'people of impossible height: depth must be multiplied by %g; '
+                          'set ~depth_scale: %g (now %g); 3D boxes are wrong or missing until then'
+                          % (factor, factor * unit_m, unit_m))
 
     def _usable_boxes(self, boxes2d):
         """Return the Boxes2D whose rectangles are neither empty nor reversed."""
