@@ -164,16 +164,19 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     """
     rects_px = list(map(tuple, rects_px))
     rays = level_rays(geometry.camera, geometry.level_axes)
-    samples, truncated, usable, boxes = [], [], [], [None] * len(rects_px)
+    samples, whole_px, truncated, usable, boxes = [], [], [], [], [None] * len(rects_px)
     for rect_px, kind in zip(rects_px, kinds):
         edges = truncated_edges(rect_px, geometry.area_px)
+        of_rect = RectSamples(depth, rect_px, rays, *_expected(kind, edges))
         if kind.group == PERSON and edges[1]:
-            rect_px = _widened(rect_px, edges, depth, kind, rays, geometry)
-            edges = truncated_edges(rect_px, geometry.area_px)
-        surrounded, least_m = _expected(kind, edges)
-        samples.append(RectSamples(depth, rect_px, rays, surrounded, least_m))
+            wider_px = _widened(of_rect, depth, kind, rays, geometry)
+            if wider_px != rect_px:
+                edges = truncated_edges(wider_px, geometry.area_px)
+                of_rect = RectSamples(depth, wider_px, rays, *_expected(kind, edges))
+        samples.append(of_rect)
+        whole_px.append(of_rect.rect_px)
         truncated.append(edges)
-    flat_px = without_distortion([each.rect_px for each in samples], geometry.camera)
+    flat_px = without_distortion(whole_px, geometry.camera)
     for number, each in enumerate(samples):
         rows, columns = each.shape
         has_depth = each.measured >= max(LEAST_MEASURED * rows * columns, 1)
@@ -192,19 +195,18 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     return boxes
 
 
-def _widened(rect_px, truncated, depth, kind, rays, geometry):
-    """The rectangle of a person, wider where the body continues beside it, up to the usual width.
+def _widened(samples, depth, kind, rays, geometry):
+    """The rectangle of the samples of a person, wider where the body continues beside it, up to the usual width.
 
     Of people who are so near that their heads are above the image, detectors often find an arm or half of the trunk.
     """
-    left, top, right, bottom = rect_px
-    layer = RectSamples(depth, rect_px, rays, _expected(kind, truncated)[0]).layer()
+    layer, (left, top, right, bottom) = samples.layer(), samples.rect_px
     if not layer:
-        return rect_px
+        return samples.rect_px
     pixels_per_m = geometry.camera.fx / (layer.trunk_mm / 1000)
     missing_px = int(kind.width * pixels_per_m) - (right - left)
     if missing_px <= 0:
-        return rect_px
+        return samples.rect_px
     area_left, _top, area_right, _bottom = geometry.area_px
     around_px = max(left - missing_px, area_left), top, min(right + missing_px, area_right), bottom
     around = RectSamples(depth, around_px, rays, (False, False, False))

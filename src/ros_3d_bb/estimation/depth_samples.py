@@ -171,8 +171,8 @@ class RectSamples(object):
     def columns_of(self, layer, left, right, gap_px):
         """First column, and the one after the last, of the body of a Layer that continues on both sides of the columns
         from `left` to before `right`, with gaps of at most `gap_px` pixels."""
-        on_body, known = (np.count_nonzero(each.reshape(self.shape), axis=0)
-                          for each in (self.on_body(layer), self._ahead_mm < UNKNOWN_MM))
+        on_body = np.count_nonzero(self.on_body(layer).reshape(self.shape), axis=0)
+        known = np.count_nonzero((self._ahead_mm < UNKNOWN_MM).reshape(self.shape), axis=0)
         step = self._columns.step
         columns = np.arange(self._columns.start, self._columns.stop, step)[2 * on_body > known].tolist()
         for column in reversed(columns):
