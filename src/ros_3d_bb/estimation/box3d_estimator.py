@@ -311,6 +311,7 @@ def complete_truncated_extent(low, high, cut_low, cut_high, usual):
 
 def slope_down(u, v, geometry):
     """y / z in the level frame of the ray through an undistorted position (u, v), pixels."""
-    camera, (_across, (down_x, down_y, down_z), (ahead_x, ahead_y, ahead_z)) = geometry.camera, geometry.level_axes
+    camera = geometry.camera
+    _across, (down_x, down_y, down_z), (ahead_x, ahead_y, ahead_z) = geometry.level_axes
     x, y = (u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy
     return (down_x * x + down_y * y + down_z) / max(ahead_x * x + ahead_y * y + ahead_z, LEAST_AHEAD)
