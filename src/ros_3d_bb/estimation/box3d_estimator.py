@@ -147,7 +147,7 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     does not include raised arms. If the image border truncates the object, it is completed to the usual size of its
     class. All of this is done in the level frame.
 
-    The rectangle of a person whose head is above the image is widened before (`_widened`).
+    Samples of a person whose head is above the image are those in a wider rectangle (`_widened`).
 
     In the rectangles of nearer objects with plausible boxes, pixels that are not behind them are masked. Rectangles are
     therefore estimated in groups, each after those in front of it. Of several rectangles of one object, only the
@@ -182,7 +182,7 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
         has_depth = each.measured >= max(LEAST_MEASURED * rows * columns, 1)
         if has_depth and math.isfinite(sum(flat_px[number])):
             usable.append(number)
-    overlaps = Overlaps(samples, usable, geometry.camera, kinds, truncated)
+    overlaps = Overlaps(rects_px, samples, usable, geometry.camera, kinds, truncated)
     while overlaps.pending:
         for number in overlaps.take_foremost():
             seen = _visible_extents(samples[number], flat_px[number], geometry, number in overlaps.repeats)

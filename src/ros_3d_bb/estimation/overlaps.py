@@ -18,23 +18,22 @@ MANY, MOST_TIES = 200, 256
 class Overlaps(object):
     """Rectangles of an image, those of nearer objects first.
 
-    `samples` are the RectSamples, `kinds` the ObjectClasses and `truncated` the truncated edges of all rectangles;
-    `usable` are the numbers of those with enough depth for an estimate.
+    Of all `rects_px`, `samples` are the RectSamples, which may be of a wider rectangle, `kinds` the ObjectClasses and
+    `truncated` the truncated edges; `usable` are the numbers of those with enough depth for an estimate.
     """
 
-    def __init__(self, samples, usable, camera, kinds, truncated):
-        self._samples, self._kinds = samples, kinds
+    def __init__(self, rects_px, samples, usable, camera, kinds, truncated):
+        self._rects_px, self._samples, self._kinds = rects_px, samples, kinds
         self._clearly_lower_px = CLEARLY_LOWER * camera.height
         self._areas_px, self._lowest_px, self._nearest_m = [], [], []
-        for each, kind, edges in zip(samples, kinds, truncated):
-            x1, y1, x2, y2 = each.rect_px
+        for (x1, y1, x2, y2), kind, edges in zip(rects_px, kinds, truncated):
             self._areas_px.append((x2 - x1) * (y2 - y1))
             self._lowest_px.append(min(y2, camera.height * (1 - CUT_ROWS)))
             usual_m = 0 if any(edges) else max(kind.width, kind.height)  # nearer objects would be unusually small
             self._nearest_m.append(LEAST_SIZE * usual_m * camera.fy / max(x2 - x1, y2 - y1, 1))
         self.pending = set(usable)  # without an estimate yet
         self._changed = set(usable)  # since the layer was determined
-        self._shared_px = _shared_areas(usable, samples)  # with each pending rectangle that overlaps another one
+        self._shared_px = _shared_areas(usable, rects_px)  # with each pending rectangle that overlaps another one
         self._nearer = collections.defaultdict(set)  # pending rectangles of nearer objects that overlap it
         self._layers_m, self._beside_m, self._ties = {}, {}, 0
         self.repeats = set()  # may be of the object of a larger rectangle
@@ -100,7 +99,7 @@ class Overlaps(object):
         is_beside = self._shared_px[number][other] <= (1 - LEAST_BESIDE) * self._areas_px[number]
         if is_beside and self._ties < MOST_TIES:
             self._ties += 1
-            layer = self._samples[number].layer_beside(self._samples[other].rect_px)
+            layer = self._samples[number].layer_beside(self._rects_px[other])
             if layer is not None:
                 self._beside_m[number, other] = layer.trunk_mm / 1000
         return self._layer_beside(number, other)
@@ -132,13 +131,13 @@ class Overlaps(object):
             is_farther = layer_m - self._layer_beside(number, other) >= SAME_LAYER_M and (
                 (other, number) in self._beside_m or not self._are_alike(other, number))
             own_mm = 1000 * layer_m - BODY_HALF_DEPTH_MM if is_farther else UNKNOWN_MM  # from there on, its own body
-            if self._samples[other].mask(self._samples[number].rect_px, min(farthest_mm, own_mm)):
+            if self._samples[other].mask(self._rects_px[number], min(farthest_mm, own_mm)):
                 self._changed.add(other)
 
 
-def _shared_areas(usable, samples):
+def _shared_areas(usable, rects_px):
     """Areas that rectangles share with each other one that they overlap, pixels: {number: {other: area}}."""
-    by_left = sorted([samples[number].rect_px + (number,) for number in usable])
+    by_left = sorted([rects_px[number] + (number,) for number in usable])
     shared_px = collections.defaultdict(dict)
     for rank, (_left, top, right, bottom, number) in enumerate(by_left):
         for other_left, other_top, other_right, other_bottom, other in by_left[rank + 1:]:

@@ -31,8 +31,8 @@ LONGEST_NS = NS  # between two images; chosen: after longer, anyone may be withi
 def match_manoeuvres(tracks, measurements, matches, latest_ns, stamp_ns, height_sigma_m):
     """The pairs (Track, Measurement) outside of the gate that have no other candidates.
 
-    `matches` are those of the association, `latest_ns` is the stamp of the latest image of the camera. The velocities of
-    the tracks become as uncertain as their motion to the measurement. Unless this is nearer to the prediction, as of
+    `matches` are those of the association, `latest_ns` is the stamp of the latest image of the camera. The velocities
+    of the tracks become as uncertain as their motion to the measurement. Unless this is nearer to the prediction, as of
     people who bend while they walk, the motion starts at rest at the latest box: a wrong velocity must not lead away
     from boxes that agree. At high rates, both boxes may be outliers.
     """
