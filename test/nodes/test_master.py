@@ -93,7 +93,7 @@ def test_the_master_is_killed_and_restarted(tmp_path, monkeypatch):
             wait_until(lambda: [pid_of(node) for node in NODES + ('/test_master',)] == pids + [os.getpid()],
                        'the nodes in the new master')
             stage.rows.append('all nodes are registered again after %.1f s' % (time.monotonic() - began_s))
-            assert rospy.get_param('/tracker_node/tracker') == 'kalman' and rospy.get_param('/use_sim_time')
+            assert rospy.get_param('/tracker_node/max_age') == 4.0 and rospy.get_param('/use_sim_time')
             with Recorder('/ros_3d_bb/tracks', TrackedObjectArray) as later_subscriber:
                 stage.send()
                 later_subscriber.wait_for(1)

@@ -98,7 +98,6 @@ def test_live_parameters_are_offered_and_each_offered_value_is_accepted(clients,
      'parameter ~outlier_share is 1.5'),
     ('tracker_node', {'target_frame': 'odom'}, 'parameter ~target_frame is read only at startup'),
     ('tracker_node', {'prediction_step': 1e-6}, 'prediction_step is 1e-06'),
-    ('tracker_node', {'alpha': 7.0}, 'parameter ~alpha is 7'),  # of the tracker that is not selected
     ('depth_detector_node', {'floor_height': float('nan'), 'min_depth': 1.0}, 'parameter ~floor_height is nan')])
 def test_a_request_with_an_invalid_value_is_rejected_as_a_whole(clients, wait_for_line, node, change, words):
     before = current(clients[node])

@@ -3,13 +3,10 @@ import pytest
 from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.measurement_model import Kinds
-from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import NOT_DETECTED, VISIBLE
 from support import people
 from support.people import VIEW
-
-TRACKERS = [Tracker, ThesisTracker]
 
 
 def at(x, y, label='person', score=0.0, index=0):
@@ -21,20 +18,18 @@ def play(tracker, images):
     return [tracker.update(number * NS // 30, detections, VIEW) for number, detections in enumerate(images)]
 
 
-@pytest.mark.parametrize('kind', TRACKERS)
-def test_a_track_has_the_class_of_its_detections(kind):
-    tracks = play(kind(), [[at(3, -1, 'dog', 0.75, 0), at(3, 1, 'chair', 0.5, 1)]] * 10)[-1]
+def test_a_track_has_the_class_of_its_detections():
+    tracks = play(Tracker(), [[at(3, -1, 'dog', 0.75, 0), at(3, 1, 'chair', 0.5, 1)]] * 10)[-1]
     assert [(track.label, track.detection) for track in tracks] == [('dog', 0), ('chair', 1)]
     assert [track.score for track in tracks] == pytest.approx([0.75, 0.5])
 
 
-@pytest.mark.parametrize('kind', TRACKERS)
-def test_tracks_never_change_between_groups(kind):
+def test_tracks_never_change_between_groups():
     """A person walks past a chair and stops in its place."""
     images = [[at(3, 0.04 * number - 1.2, 'person'), at(3, 0, 'chair')] for number in range(30)]
     images += [[at(3, 0, 'chair')]] * 15 + [[at(3, 0, 'person')]] * 15
     labels = {}
-    for tracks in play(kind(), images):
+    for tracks in play(Tracker(), images):
         for track in tracks:
             labels.setdefault(track.id, set()).add(track.label)
     assert sorted(map(sorted, labels.values())) >= [['chair'], ['person']]
@@ -56,10 +51,8 @@ def test_the_label_is_the_most_probable_class_of_the_group():
     assert play(Tracker(), higher_score)[-1][0].label == 'cat'
 
 
-@pytest.mark.parametrize('kind', TRACKERS)
-def test_a_track_that_was_not_detected_has_no_detection(kind):
-    tracker = kind()
-    seen, missed, again = play(tracker, [[at(3, 0, index=2)]] * 10 + [[]] + [[at(3, 0, index=1)]])[-3:]
+def test_a_track_that_was_not_detected_has_no_detection():
+    seen, missed, again = play(Tracker(), [[at(3, 0, index=2)]] * 10 + [[]] + [[at(3, 0, index=1)]])[-3:]
     assert [tracks[0].detection for tracks in (seen, missed, again)] == [2, NOT_DETECTED, 1]
 
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
 from ros_3d_bb_lab.evaluation import __main__ as command
 from ros_3d_bb_lab.evaluation.baselines.oracle_association import outputs_with_perfect_association
 from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker
@@ -42,9 +41,9 @@ def test_the_same_seed_gives_the_same_run_and_another_one_another():
 @pytest.mark.needs('trackeval')
 def test_perfect_association_has_fewer_id_switches_and_false_positives():
     run = simulate(made_sequences(0, 20)[1], DRIVING, 0, seconds=2)
-    outputs = outputs_with_perfect_association(ThesisTracker, run)
+    outputs = outputs_with_perfect_association(OriginalTracker, run)
     bound = scores_of([score_run(run, outputs)])
-    plain = scores_of([score_run(run, outputs_of(ThesisTracker, run))])
+    plain = scores_of([score_run(run, outputs_of(OriginalTracker, run))])
     assert bound['id_switches'] <= plain['id_switches'] and bound['idf1'] > plain['idf1']
     assert bound['precision'] > 95
     for image, things in zip(run.images, outputs):

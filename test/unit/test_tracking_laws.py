@@ -8,7 +8,6 @@ from ros_3d_bb.camera.camera_model import transform_from, transform_points
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.measurement_model import NoiseParams
-from ros_3d_bb.tracking.thesis_tracker import ThesisTracker, ThesisTrackerParams
 from ros_3d_bb.tracking.track import PredictionParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
 from ros_3d_bb.tracking.types import CameraView
@@ -17,7 +16,7 @@ from support.states import covariance_of
 
 PERIOD_NS = NS // 30
 SEEDS = st.integers(0, 2 ** 32 - 1)
-KALMAN = TrackerParams, NoiseParams, PredictionParams
+PARAMS = TrackerParams, NoiseParams, PredictionParams
 
 
 def any_covariance(random):
@@ -54,21 +53,20 @@ def test_nearly_singular_covariances_do_not_stop_the_tracker(angle):
 
 
 def ends_of_sliders():
-    """Each live parameter of each tracker, at both ends of its slider."""
-    for make, kinds in ((Tracker, KALMAN), (ThesisTracker, (ThesisTrackerParams,))):
-        for name, param in ((name, kind.PARAMS[name]) for kind in kinds for name in kind._fields):
-            for value in param.live if isinstance(param.live, tuple) else ():
-                yield pytest.param(make, kinds, {name: value}, id='%s-%s-%g' % (make.__name__, name, value))
+    """Each live parameter at both ends of its slider."""
+    for name, param in ((name, kind.PARAMS[name]) for kind in PARAMS for name in kind._fields):
+        for value in param.live if isinstance(param.live, tuple) else ():
+            yield pytest.param({name: value}, id='%s-%g' % (name, value))
 
 
 @pytest.mark.parametrize('changed_at', [0, 20])
-@pytest.mark.parametrize('make,kinds,given_params', ends_of_sliders())
-def test_a_detected_person_keeps_one_id_at_the_ends_of_all_sliders(make, kinds, given_params, changed_at):
+@pytest.mark.parametrize('given_params', ends_of_sliders())
+def test_a_detected_person_keeps_one_id_at_the_ends_of_all_sliders(given_params, changed_at):
     """The person walks in a slight curve. The parameter is changed before the first image, or after 2 s."""
-    random, tracker, published = np.random.RandomState(0), make(), []
+    random, tracker, published = np.random.RandomState(0), Tracker(), []
     for image in range(60):
         if image == changed_at:
-            tracker.reconfigure(*params_from(given_params, *kinds))
+            tracker.reconfigure(*params_from(given_params, *PARAMS))
         x_m, y_m, height_m = (5 - 0.06 * image, 0.3 * np.sin(0.12 * image), 1.7) + random.normal(0, 0.03, 3)
         person = at(x_m, y_m, height_m, score=0.97)
         published.append(ids(tracker.update(START_NS + 3 * image * PERIOD_NS, [person], VIEW)))

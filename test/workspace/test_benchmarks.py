@@ -13,17 +13,14 @@ from support.processes import processes_naming
 from support.real_planners import planner_environment
 
 ARGUMENTS = ['scenario:=/some/scene.yaml', 'record:=/some/record.json']
-SEPARATE = {'bbox3d_node', 'tracker_node'}
-PIPELINE = {'ours': SEPARATE, 'limited': SEPARATE, 'thesis': {'people_node'}}
 
 
 @pytest.mark.parametrize('mode', MODES)
 def test_modes_differ_in_what_move_base_knows_of_people(mode):
     parameters, nodes = loaded('navigation_benchmark.launch', 'mode:=' + mode, *ARGUMENTS)
-    is_tracked = mode in PIPELINE
-    assert {'people_node', 'bbox3d_node', 'tracker_node'} & set(nodes) == PIPELINE.get(mode, set())
+    is_tracked = mode in ('ours', 'limited')
+    assert {'bbox3d_node', 'tracker_node'} & set(nodes) == ({'bbox3d_node', 'tracker_node'} if is_tracked else set())
     assert parameters['/simulator_node/boxes'] == is_tracked
-    assert (parameters.get('/tracker_node/tracker') == 'thesis') == (mode == 'thesis')
     assert (['ground_truth', 'ros_3d_bb/tracks'] in nodes['simulator_node'].remap_args) == (mode == 'truth')
     layers = [layer['name'] for layer in parameters['/move_base/local_costmap/plugins']]
     assert layers == ['static_layer'] + {

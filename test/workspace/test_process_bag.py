@@ -224,7 +224,7 @@ def test_parameter_files_are_checked(tmp_path, capsys, text, complaint):
 
 def test_parameter_files_of_the_nodes_are_used(scene, tmp_path):
     config = os.path.join(os.path.dirname(__file__), '..', '..', 'config')
-    (tmp_path / 'tracker.yaml').write_text('tracker: thesis\ntarget_frame: odom\n')
+    (tmp_path / 'tracker.yaml').write_text('max_age: 2.0\ntarget_frame: odom\n')
     run_tool(scene, tmp_path / 'out.bag', '--detector', 'depth', '--tracker-params', tmp_path / 'tracker.yaml',
              '--bbox3d-params', os.path.join(config, 'bbox3d.yaml'),
              '--depth-params', os.path.join(config, 'depth_detector.yaml'))

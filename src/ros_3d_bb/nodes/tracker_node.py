@@ -39,9 +39,9 @@ class TrackerNode(object):
     ros_3d_bb/bb_3d : ros_3d_bb/BoundingBox3DArray
         3D boxes.
     camera/color/camera_info : sensor_msgs/CameraInfo
-        Calibration, used to determine which tracks are out of view; not with ~tracker thesis.
+        Calibration, used to determine which tracks are out of view.
     camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
-        Depth image, used to determine which tracks are occluded; not with ~tracker thesis or without ~use_depth.
+        Depth image, used to determine which tracks are occluded; not without ~use_depth.
     map : nav_msgs/OccupancyGrid
         Static map in ~target_frame, in whose occupied cells no track starts; only with ~use_map.
     /tf,/tf_static : tf2_msgs/TFMessage
@@ -68,25 +68,24 @@ class TrackerNode(object):
         self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=10)
         self._markers_pub = rospy.Publisher(MARKERS_TOPIC, MarkerArray, queue_size=10)
         for camera in self._stage.cameras:
-            self._subscribe(camera, params.depth, part.subscribes)
+            self._subscribe(camera, params, part.subscribes)
         if params.use_map:
             subscribe('map', OccupancyGrid, self._on_map, 1, is_irregular=True)
         self._markers.areas_m = self._stage.ignored_areas
         ReconfigureServer(given, self._reconfigure, part.namespace)
 
-    def _subscribe(self, camera, depth, with_boxes):
-        depth_topic = topic_of(camera, DEPTH_TOPICS[depth][0])
+    def _subscribe(self, camera, params, with_boxes):
+        depth_topic = topic_of(camera, DEPTH_TOPICS[params.depth][0])
 
         def of_camera(callback):
             return functools.partial(callback, camera=camera)
         if with_boxes:
             subscribe(topic_of(camera, BOXES3D_TOPIC), BoundingBox3DArray, of_camera(self.on_boxes))
-        if self._stage.uses_camera_info:
-            subscribe_camera_info(topic_of(camera, INFO_TOPICS[0]), topic_of(camera, COLOR_INFO_IMAGES[depth]),
-                                  of_camera(self._on_camera_info), 1)
-        if self._stage.uses_depth:
+        subscribe_camera_info(topic_of(camera, INFO_TOPICS[0]), topic_of(camera, COLOR_INFO_IMAGES[params.depth]),
+                              of_camera(self._on_camera_info), 1)
+        if params.use_depth:
             subscribe(depth_topic, Image, of_camera(self._on_depth), KEPT_AT_ONCE)
-        if self._stage.uses_depth and depth == RAW:
+        if params.use_depth and params.depth == RAW:
             depth_info_topic = info_topic_beside(rospy.resolve_name(depth_topic))
             subscribe_camera_info(depth_info_topic, depth_topic, of_camera(self._on_depth_camera_info), 1)
 

@@ -108,20 +108,20 @@ class PeoplePipeline(object):
         """Process a message on one of the `INPUTS` except tf, which arrived at `now_ns`. Raises ValueError."""
         self._now_ns = now_ns
         source, tracking_stage = self._sources[camera], self._tracking_stage
+        tracks_with_depth = self._settings.tracker[0].use_depth
         if topic in INFO_TOPICS:
             images = COLOR_INFO_IMAGES[self._settings.bbox3d[0].depth] if topic == INFO_TOPIC else DEPTH_TOPIC
             message = info_of_images(message, self._settings.name(images, camera))
         if topic == INFO_TOPIC:
-            if tracking_stage.uses_camera_info:
-                tracking_stage.add_camera_info(message, camera)
+            tracking_stage.add_camera_info(message, camera)
             source.add_camera_info(message, now_ns)
         elif topic == DEPTH_INFO_TOPIC:
-            if tracking_stage.uses_depth:
+            if tracks_with_depth:
                 tracking_stage.add_depth_camera_info(message, camera)
             source.add_depth_camera_info(message, now_ns)
         elif topic == DEPTH_TOPIC:
             message = uncompressed(message)  # once for all stages
-            if tracking_stage.uses_depth:
+            if tracks_with_depth:
                 tracking_stage.add_depth(message, now_ns, camera)
             source.add_depth(message, now_ns)
         elif topic == COLOR_TOPIC:

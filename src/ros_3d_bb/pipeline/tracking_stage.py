@@ -14,6 +14,7 @@ from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, RAW, topic_of
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
 from ros_3d_bb.conversions.perception_msgs import (camera_from_msg, occupied_from_msg, stamp_of, time_from,
                                                    usable_boxes3d)
+from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.object_classes import read_object_classes
 from ros_3d_bb.core.params import CLASSES_FILE, DEPTH, DEPTH_SCALE, SET_BY_LAUNCH, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, CameraClocks, MessageCache
@@ -21,14 +22,11 @@ from ros_3d_bb.estimation.error_model import error_model_of_param
 from ros_3d_bb.pipeline.depth_registration import DepthRegistration
 from ros_3d_bb.tracking.measurement_model import NoiseParams
 from ros_3d_bb.tracking.occlusion import depths_towards
-from ros_3d_bb.tracking.thesis_tracker import ThesisTracker, ThesisTrackerParams
 from ros_3d_bb.tracking.track import PredictionParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
 from ros_3d_bb.tracking.types import CameraView, detections_from_boxes
 
-TRACKERS = {'thesis': (ThesisTracker, [ThesisTrackerParams]),
-            'kalman': (Tracker, [TrackerParams, NoiseParams, PredictionParams])}
-TRACKING_PARAMS = tuple(kind for _tracker, kinds in TRACKERS.values() for kind in kinds)
+TRACKING_PARAMS = TrackerParams, NoiseParams, PredictionParams
 AHEAD, BEHIND = 'images ahead of other cameras', 'images behind other cameras'  # counters
 CONTRADICTION = 'cameras that contradict each other'  # event, reported once
 NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/\w+)*$')
@@ -36,12 +34,8 @@ NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/\w+)*$')
 
 @parameters()
 class TrackerNodeParams(NamedTuple):
-    """Parameters of tracker_node, except those of the trackers and markers."""
+    """Parameters of tracker_node, except those of the tracker and markers."""
 
-    tracker: str = Param(
-        'kalman', 'Tracking algorithm. kalman: a Kalman filter for each person, which weighs boxes by their '
-        'covariance, models outliers and occlusion, and re-identifies people after it. thesis: greedy nearest '
-        'neighbour, averaged velocity and straight prediction, for comparison.', choices=('kalman', 'thesis'))
     target_frame: str = Param('map')
     error_model: str = Param('')
     cameras: list = Param(())
@@ -73,8 +67,7 @@ class TrackingStage(object):
     tracks (list of `types.TrackedObject`) after each image and their header, which has the newest stamp and the fixed
     frame; `lock` is held meanwhile. The IDs of tracks are greater than `last_id`.
 
-    Attributes: `cameras`, the namespaces of the cameras; `uses_camera_info` and `uses_depth`, whether these messages
-    are used: the thesis tracker considers neither the field of view nor occlusion; and `lock`.
+    Attributes: `cameras`, the namespaces of the cameras; and `lock`.
     """
 
     def __init__(self, params, tracking, events, transforms, on_tracks, last_id=0):
@@ -82,13 +75,10 @@ class TrackingStage(object):
         params = params._replace(target_frame=params.target_frame.lstrip('/'))  # tf2 rejects frames with a slash
         self._params, self._events, self._transforms, self._on_tracks = params, events, transforms, on_tracks
         self.cameras = tuple(params.cameras) or ('',)
-        self.uses_camera_info = params.tracker != 'thesis'
-        self.uses_depth = self.uses_camera_info and params.use_depth
-        tracker, self._kinds = TRACKERS[params.tracker]
         self._classes = read_object_classes(params.classes_file)
         model = error_model_of_param(params.error_model)
-        more = {'detector': model.detector} if model and tracker is Tracker else {}
-        self._tracker = tracker(*self._params_of_tracker(tracking), last_id=last_id, classes=self._classes, **more)
+        self._tracker = Tracker(*tracking, last_id=last_id, classes=self._classes,
+                                detector=model.detector if model else DetectorModel())
         self.lock = threading.RLock()
         self._clocks = CameraClocks()
         self._jumps = 0  # number of backward jumps in time
@@ -101,10 +91,7 @@ class TrackingStage(object):
     def reconfigure(self, tracking):
         """Use other tracking parameters for the next boxes; tracks are kept. Raises ValueError as the constructor."""
         with self.lock:
-            self._tracker.reconfigure(*self._params_of_tracker(tracking))
-
-    def _params_of_tracker(self, tracking):
-        return [params for params in tracking if type(params) in self._kinds]
+            self._tracker.reconfigure(*tracking)
 
     @property
     def ignored_areas(self):
@@ -295,8 +282,3 @@ def _check(params):
     if params.cameras and params.camera_frame:
         raise ValueError('parameter ~camera_frame is %r, and ~cameras are %s; expected with a single camera only'
                          % (params.camera_frame, ', '.join(params.cameras)))
-    if params.use_map and params.tracker == 'thesis':
-        raise ValueError('parameter ~tracker is thesis, and ~use_map is true; this tracker uses no map')
-    if params.cameras and params.tracker == 'thesis':
-        raise ValueError('parameter ~tracker is thesis, and ~cameras are %s; this tracker supports a single camera only'
-                         % ', '.join(params.cameras))

@@ -35,7 +35,7 @@ SETTLED_HITS = 3  # innovations of newer tracks show their unknown velocity
 # Of the variance, for a twentieth to twice the standard deviation; from 0.15 on while the pose of a camera changes,
 # because the corrections of a localisation last for some images.
 MIN_LOG_SCALE, MIN_MOVING_LOG_SCALE, MAX_LOG_SCALE = 2 * math.log(0.05), 2 * math.log(0.15), 2 * math.log(2)
-BOX_ERRORS = 'kalman: errors of boxes (their covariance comes from the error model of bbox3d_node)'
+BOX_ERRORS = 'errors of boxes (their covariance comes from the error model of bbox3d_node)'
 
 
 @parameters(BOX_ERRORS)

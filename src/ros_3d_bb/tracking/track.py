@@ -18,8 +18,7 @@ import numpy as np
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking import kalman_filter
-from ros_3d_bb.tracking.types import (NOT_DETECTED, OUT_OF_VIEW, PREDICTION_STEP, PREDICTION_TIME, VISIBLE,
-                                      TrackedObject, prediction_times_s)
+from ros_3d_bb.tracking.types import NOT_DETECTED, OUT_OF_VIEW, VISIBLE, TrackedObject, prediction_times_s
 
 # All are chosen; `./run bench tracking` and `./run bench scenes` show the effect of others.
 HIT_CORRELATION_S = 0.08  # without scores, three images at 30 Hz or two independent ones confirm a track by default
@@ -65,12 +64,12 @@ AHEAD = np.reshape((COVARIANCE[:3, :3], _CROSS, COVARIANCE[3:, 3:], _NOTHING, _C
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])  # a covariance (3, 3) of 1 along x and y
 
 
-@parameters('kalman: how certain predictions are')
+@parameters('predictions')
 class PredictionParams(NamedTuple):
     """Parameters of the prediction of tracks."""
 
-    prediction_time: float = PREDICTION_TIME
-    prediction_step: float = PREDICTION_STEP
+    prediction_time: float = Param(2.0, 'How far ahead positions are predicted; 2 in the thesis.', 's', live=(0, 10))
+    prediction_step: float = Param(0.25, 'Time between predicted positions.', 's', live=(0.05, 1))
     prediction_acceleration: float = Param(
         0.02, 'How much more people turn than the filter models: density of a white acceleration.', 'm^2/s^3',
         live=(0, 1))

@@ -28,7 +28,7 @@ from ros_3d_bb.tracking.occlusion import CameraState, contradicting_cameras, mar
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, OutOfSequenceBuffer
 from ros_3d_bb.tracking.track import (MIN_TRACK_SCORE, NEVER_NS, SEEN, PredictionParams, Rules, Track,
                                       learned_prediction, published)
-from ros_3d_bb.tracking.types import MOVING_SPEED, VISIBLE, Totals, TrackerBase
+from ros_3d_bb.tracking.types import VISIBLE, Totals, check_steps
 
 KNOWN_NS = 60 * NS  # a camera without images for longer than this, while others send images, counts as new; chosen
 MOVED, MOVING_NS = 0.001, 10 * NS  # change of the pose of a camera that moves, m and rad, and duration; chosen
@@ -36,13 +36,13 @@ MAX_POSITION_STD_M = 2.4  # tracks whose position is less certain are dropped; c
 TENTATIVE_TIMEOUT_S = 0.75  # how long a tentative track is kept without a detection; chosen
 BY_ID, FIRST_SEEN = operator.attrgetter('id'), operator.attrgetter('first_ns')
 # Sections of the parameters.
-PLACES = 'kalman: where no track starts'
-MOTION, ASSOCIATION = 'kalman: how people move', 'kalman: association of boxes with tracks'
+PLACES = 'where no track starts'
+MOTION, ASSOCIATION = 'how people move', 'association of boxes with tracks'
 
 
-@parameters('kalman: life of a track')
+@parameters('life of a track')
 class TrackerParams(NamedTuple):
-    """Parameters of the Kalman tracker."""
+    """Parameters of the tracker."""
 
     acceleration: float = Param(
         0.08, 'How much the velocity of a walking person varies: density of a white acceleration. With 0, people who '
@@ -77,7 +77,8 @@ class TrackerParams(NamedTuple):
         4.0, 'A person who is not detected for longer than this gets a new track ID. So does one who reappears where a '
         'new target is more likely: with the default parameters after 3 s, except for people who stop behind an '
         'occluder. With 0, every missed person gets a new ID.', 's', live=(0, 30))
-    moving_speed: float = MOVING_SPEED
+    moving_speed: float = Param(
+        0.2, 'A person counts as moving from this speed on, and then down to half of it.', 'm/s', live=(0, 1))
     ignored_areas: str = Param(
         '', 'Polygons of the fixed frame in which no track starts, as around mirrors and posters: a list of lists of '
         'corners, such as [[[1, 2], [3, 2], [3, 4]]]; empty: none. Tracked people can walk through. Tracks in an area '
@@ -102,11 +103,12 @@ class _State(NamedTuple):
     totals: Totals
 
 
-class Tracker(TrackerBase):
-    """Tracks people and other objects from image to image, as of `types.TrackerBase`.
+class Tracker(object):
+    """Tracks people and other objects from image to image.
 
     Images of several cameras may arrive late and in any order. Parameters: TrackerParams, NoiseParams and
-    PredictionParams. `detector` is a DetectorModel.
+    PredictionParams. `detector` is a DetectorModel. The IDs of tracks are greater than `last_id`, and tracks never
+    change between the groups of `classes`.
 
     Raises
     ------
@@ -127,7 +129,8 @@ class Tracker(TrackerBase):
     def reconfigure(self, params, noise, prediction):
         """Change the parameters and keep the tracks. Raises ValueError without any change if one is invalid."""
         areas = self.ignored._replace(polygons=polygons_from(params.ignored_areas), map_depth_m=params.map_depth)
-        super(Tracker, self).reconfigure(params, noise, prediction)
+        check_steps(prediction.prediction_time, prediction.prediction_step)
+        self._params = params, noise, prediction
         self._rules = Rules.of(params, self._kinds)
         if areas.differs_from(self.ignored):
             self._ignore(areas)
@@ -158,7 +161,8 @@ class Tracker(TrackerBase):
         self._buffer.skip(stamp_ns, camera)
 
     def update(self, stamp_ns, detections, view):
-        """Update the tracks with the detections of one image, as `TrackerBase.update`.
+        """Update the tracks with a list of Detection in the image of a CameraView. Returns the tracks as a list of
+        TrackedObject, ordered by ID, at the stamp of the newest image.
 
         The result may not include the detections of images that are several images late yet (`out_of_sequence`).
         Raises ValueError if the image is too late or a duplicate; the tracks are unchanged.

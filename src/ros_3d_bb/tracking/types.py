@@ -1,4 +1,4 @@
-"""Input and output types of the trackers. Positions and sizes are in the fixed frame (z up), metres."""
+"""Input and output types of the tracker. Positions and sizes are in the fixed frame (z up), metres."""
 import math
 from typing import Callable, NamedTuple, Optional, Sequence, Tuple
 
@@ -7,8 +7,6 @@ import numpy as np
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.images import quarter_turns
 from ros_3d_bb.core.object_classes import PERSON, ObjectClasses
-from ros_3d_bb.core.params import Param
-from ros_3d_bb.tracking.ignored_areas import IgnoredAreas
 
 VISIBLE, OCCLUDED, OUT_OF_VIEW = 0, 1, 2
 NOT_DETECTED = -1  # index of the box of an object that was not detected
@@ -16,14 +14,6 @@ NOT_DETECTED = -1  # index of the box of an object that was not detected
 NEARER_M = 0.25  # an occluding person is at least this much nearer to the camera than an occluded one
 MOST_STEPS = 1000  # maximum number of prediction steps, to limit memory
 VERTICAL = 0.02  # upper bound of the horizontal part of the optical axis of a camera that points straight up or down
-# Parameters of both trackers.
-_BOTH = 'both trackers'
-PREDICTION_TIME = Param(
-    2.0, 'How far ahead positions are predicted; 2 in the thesis.', 's', live=(0, 10), section=_BOTH)
-PREDICTION_STEP = Param(0.25, 'Time between predicted positions.', 's', live=(0.05, 1), section=_BOTH)
-MOVING_SPEED = Param(
-    0.2, 'A person counts as moving from this speed on. The kalman tracker then counts it as moving down to half of '
-    'it.', 'm/s', live=(0, 1), section=_BOTH)
 
 
 class Detection(NamedTuple):
@@ -164,37 +154,6 @@ class Totals(NamedTuple):
 
     common_motions: int = 0
     untracked_boxes: int = 0
-
-
-class TrackerBase(object):
-    """Base class of the trackers. The IDs of tracks are greater than `last_id` of the constructor, and tracks never
-    change between the groups of its table of classes, an `object_classes.ObjectClasses`.
-    """
-
-    totals = Totals()
-    ignored = IgnoredAreas()  # where no track starts
-
-    def reconfigure(self, *params):
-        """Use other parameters and keep the tracks; the last ones have `prediction_time` and `prediction_step`. Raises
-        ValueError without any change if one is invalid.
-        """
-        check_steps(params[-1].prediction_time, params[-1].prediction_step)
-        self._params = params
-
-    def update(self, stamp_ns, detections, view):
-        """Update the tracks with a list of Detection in the image of a CameraView. Returns the tracks as a list of
-        TrackedObject, ordered by ID, at the stamp of the newest image. Raises ValueError without any change if the
-        stamp is unusable.
-        """
-        raise NotImplementedError
-
-    def skip(self, stamp_ns, camera=''):
-        """Skip an image whose detections are unusable: tracks do not age. Never raises, as the stamp may be wrong."""
-        raise NotImplementedError
-
-    def reset(self):
-        """Delete all tracks, as after a jump in time. IDs are not reused."""
-        raise NotImplementedError
 
 
 def wrapped(angles):

@@ -1,4 +1,4 @@
-"""Norfair, a tracking library, with the interface of this package's trackers."""
+"""Norfair, a tracking library, with the interface of this package's tracker."""
 from typing import NamedTuple
 
 import numpy as np
@@ -52,7 +52,7 @@ class Norfair(object):
         self._now_ns, self._first_seen_ns = None, {}
 
     def update(self, stamp_ns, detections, view=None):
-        """Update the tracks with the detections of one image, as `ThesisTracker.update`."""
+        """Update the tracks with the detections of one image, as `Tracker.update`."""
         period = 1
         if self._now_ns is not None:
             period = max(1, int(round((stamp_ns - self._now_ns) / NS * COUNTS_HZ)))

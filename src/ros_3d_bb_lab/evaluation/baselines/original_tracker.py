@@ -1,11 +1,10 @@
 """The thesis' tracker as implemented in its package.
 
-It includes behaviour that the text of the thesis does not describe and that `ros_3d_bb.tracking.thesis_tracker`
-corrects. Velocities are the displacement between two images times the current rate of arrival. The camera pose is
-looked up at the time at which the boxes arrive, not at the image stamp. Missed images are counted only if there are
-more tracks than boxes, and lifetimes are in images. New tracks start only if there are fewer tracks than boxes, and
-only from boxes that are not as far from a matched track as that track's own box. If an exception occurs, the image is
-skipped, as rospy does.
+It includes behaviour that the text of the thesis does not describe. Velocities are the displacement between two images
+times the current rate of arrival. The camera pose is looked up at the time at which the boxes arrive, not at the image
+stamp. Missed images are counted only if there are more tracks than boxes, and lifetimes are in images. New tracks start
+only if there are fewer tracks than boxes, and only from boxes that are not as far from a matched track as that track's
+own box. If an exception occurs, the image is skipped, as rospy does.
 """
 import numpy as np
 
@@ -59,7 +58,7 @@ class OriginalTracker(object):
         self._tracks, self._last_id, self._now_ns, self._rate_hz = [], 0, None, USUAL_RATE_HZ
 
     def update(self, stamp_ns, detections, view=None):
-        """Update the tracks with the detections of one image, as `ThesisTracker.update`."""
+        """Update the tracks with the detections of one image, as `Tracker.update`."""
         return [self._published(track) for track in self.step(stamp_ns, detections)]
 
     def step(self, stamp_ns, detections):

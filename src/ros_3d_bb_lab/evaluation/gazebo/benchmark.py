@@ -1,5 +1,4 @@
-"""Scenes in Gazebo, with the camera of a standing Jackal: our estimator and tracker beside those of the thesis."""
-import json
+"""Scenes in Gazebo, with the camera of a standing Jackal."""
 import os
 import subprocess
 import tempfile
@@ -29,7 +28,6 @@ RECORDED = COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS[0], TF_TOPIC, STATIC_TOPIC, STA
 START_S = 4.0  # simulated time at which people begin to move
 SETTLING_S = 0.5  # Gazebo places people at the origin for a moment when they start
 TIMEOUT_S = 600.0
-TRACKERS = {'ours': {}, 'thesis': {'bbox3d': {'estimator': 'median'}, 'tracker': {'tracker': 'thesis'}}}
 
 
 def record_scene(scenario, folder):
@@ -63,17 +61,6 @@ def _wait_for_robot(environment):
     """Wait until the description of the robot is in the world, which is paused."""
     command = ['bash', '-c', 'until rostopic list -p 2> /dev/null | grep -q %s; do sleep 1; done' % DEPTH_TOPIC]
     subprocess.check_call(command, env=environment, timeout=TIMEOUT_S)
-
-
-def run_pipeline(bag, target, tracker, detector):
-    """Run the pipeline on a recorded scene. `detector` is a list of options of process_bag."""
-    command = ['rosrun', 'ros_3d_bb', 'process_bag', bag, target, '--target-frame', WORLD_FRAME, '--keep'] + detector
-    for node, params in TRACKERS[tracker].items():
-        path = '%s.%s.yaml' % (target, node)
-        with open(path, 'w') as stream:
-            json.dump(params, stream)
-        command += ['--%s-params' % node, path]
-    subprocess.check_call(command, stdout=subprocess.DEVNULL)
 
 
 def moments_in(scene_bag, tracks_bag, start_ns):
@@ -118,13 +105,11 @@ def result_of(moments):
 
 
 def run(arguments):
-    """Record each scenario, and run both trackers on it."""
+    """Record each scenario, and run the pipeline on it."""
     detector = (['--detector', 'yolov5', '--weights', os.path.abspath(arguments.weights)] if arguments.weights
                 else ['--detector', 'depth'])
     print(describe_machine(), flush=True)
-    results = []
-    for path in arguments.scenarios:
-        results += _run(path, detector)
+    results = [_run(path, detector) for path in arguments.scenarios]
     return {'machine': describe_machine(), 'detector': detector[1], 'scenes': results}
 
 
@@ -134,13 +119,10 @@ def add_options(parser):
 
 
 def _run(path, detector):
-    results = []
     with tempfile.TemporaryDirectory() as folder:
-        recorded = record_scene(read_scenario(path), folder)
-        for tracker in TRACKERS:
-            target = os.path.join(folder, tracker + '.bag')
-            run_pipeline(recorded, target, tracker, detector)
-            result = result_of(moments_in(recorded, target, int((START_S + SETTLING_S) * NS)))
-            results.append(dict(result, scene=scene_name(path), tracker=tracker))
-            print(line_of(**results[-1]), flush=True)
-    return results
+        recorded, target = record_scene(read_scenario(path), folder), os.path.join(folder, 'tracks.bag')
+        subprocess.check_call(['rosrun', 'ros_3d_bb', 'process_bag', recorded, target, '--target-frame', WORLD_FRAME,
+                               '--keep'] + detector, stdout=subprocess.DEVNULL)
+        result = dict(result_of(moments_in(recorded, target, int((START_S + SETTLING_S) * NS))), scene=scene_name(path))
+    print(line_of(**result), flush=True)
+    return result

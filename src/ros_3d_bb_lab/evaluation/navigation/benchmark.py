@@ -7,11 +7,11 @@ import yaml
 
 from ros_3d_bb_lab.evaluation.defaults import describe_machine, in_range
 from ros_3d_bb_lab.evaluation.launching import recorded
-from ros_3d_bb_lab.evaluation.navigation.navigation_scenes import CAMERAS, GOAL_M, RATE_HZ, SCENES, scenario_of
+from ros_3d_bb_lab.evaluation.navigation.navigation_scenes import GOAL_M, RATE_HZ, SCENES, scenario_of
 from ros_3d_bb_lab.evaluation.navigation.trial_result import summaries
 from ros_3d_bb_lab.evaluation.text_table import line_of, table_of
 
-MODES = 'ours', 'limited', 'none', 'laser', 'depth', 'thesis', 'visible', 'truth'
+MODES = 'ours', 'limited', 'none', 'laser', 'depth', 'visible', 'truth'
 PLANNERS = 'dwa', 'teb'
 TRUE_BOXES = 'exact'
 TRIAL_TIMEOUT_S = 900.0
@@ -24,7 +24,7 @@ def run_trial(scene, mode, seed, folder, arguments):
     """
     name = os.path.join(folder, '%s-%s-%d' % (scene, mode, seed))
     with open(name + '.yaml', 'w') as stream:
-        yaml.safe_dump(scenario_of(scene, seed, arguments.rate, () if mode == 'thesis' else CAMERAS), stream)
+        yaml.safe_dump(scenario_of(scene, seed, arguments.rate), stream)
     launch_arguments = {'scenario': name + '.yaml', 'mode': mode, 'goal_x': GOAL_M[0], 'goal_y': GOAL_M[1],
                         'local_planner': arguments.planner}
     if arguments.detector == 'depth':
@@ -64,7 +64,7 @@ def add_options(parser):
                         help='some of %s' % ', '.join(MODES))
     parser.add_argument('--planner', choices=PLANNERS, default='dwa', help='local planner (default: dwa)')
     parser.add_argument('--detector', default=TRUE_BOXES, metavar='exact|depth|FILE',
-                        help='2D boxes of the modes ours, limited and thesis: true ones with a jitter of 1 pixel; '
+                        help='2D boxes of the modes ours and limited: true ones with a jitter of 1 pixel; '
                         'depth_detector_node; yolov5_node with these weights (default: exact)')
     parser.add_argument('--rate', type=in_range(float, 1, 30), default=RATE_HZ, metavar='HZ',
                         help='images per second of each camera (default: %g)' % RATE_HZ)

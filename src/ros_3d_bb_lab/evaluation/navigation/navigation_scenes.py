@@ -3,7 +3,7 @@
 Convention: map frame, metres, radians, seconds. The seed varies positions, speeds and start times of the people.
 
 The robot has three cameras of 55 degrees, which see bearings up to 76 degrees: a person at 1.2 m/s who meets a robot at
-0.8 m/s at a right angle stays at a bearing of 56 degrees. The tracker of the thesis supports one camera only.
+0.8 m/s at a right angle stays at a bearing of 56 degrees.
 """
 import numpy as np
 
@@ -76,12 +76,12 @@ SCENES = {scene.__name__: scene for scene in (standing, head_on, crossing_left, 
                                               crowd, pillar)}
 
 
-def scenario_of(name, seed, rate_hz=RATE_HZ, cameras=CAMERAS):
-    """Content of the scenario file of a scene; without `cameras` the robot has one, which looks ahead."""
+def scenario_of(name, seed, rate_hz=RATE_HZ):
+    """Content of the scenario file of a scene."""
     random = np.random.RandomState([seed, sorted(SCENES).index(name)])
     people, furniture = SCENES[name](random)
     return {'duration': DURATION_S, 'rate': rate_hz, 'seed': seed, 'people': people,
-            'robot': {'pose': [0.0, 0.0, 0.0], 'cameras': list(cameras)},
+            'robot': {'pose': [0.0, 0.0, 0.0], 'cameras': CAMERAS},
             'room': {'bounds': BOUNDS_M, 'height': 2.8, 'furniture': furniture}}
 
 

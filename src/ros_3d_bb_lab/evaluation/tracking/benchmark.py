@@ -9,7 +9,6 @@ import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.error_model import read_error_model
-from ros_3d_bb.tracking.thesis_tracker import ThesisTracker
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb_lab.evaluation.baselines.norfair_baseline import LIDAR, LIDAR_SCORE, Norfair
 from ros_3d_bb_lab.evaluation.baselines.oracle_association import outputs_with_perfect_association
@@ -42,10 +41,9 @@ def outputs_of(make_tracker, run):
     return [tracker.update(image.stamp_ns, image.detections, image.view) for image in run.images]
 
 
-# `thesis` is the tracker as implemented in the thesis' package; `thesis_mended` is that of `~tracker: thesis`.
 CONTESTANTS = (Contestant('ours', Tracker, outputs_of),
                Contestant('thesis', OriginalTracker, lambda make, run: outputs_of(make, as_it_arrived(run))),
-               Contestant('thesis_mended', ThesisTracker, outputs_of), Contestant('library', Norfair, outputs_of))
+               Contestant('library', Norfair, outputs_of))
 
 
 def _norfair_outputs(make_tracker, run):
