@@ -8,9 +8,9 @@ import time
 from xmlrpc.client import ServerProxy
 
 import rospy
+from rosgraph.network import write_ros_handshake_header
 
 from ros_3d_bb_lab.evaluation.latency.latency_probe_node import pid_of
-from ros_3d_bb_lab.evaluation.latency.rospy_limit import connect
 from support.ros import TIMEOUT_S, wait_until
 
 
@@ -48,7 +48,9 @@ def hanging(node):
 def never_reading(node, topic):
     """A node has a subscriber that never reads from its connection."""
     uri = rospy.get_master().lookupNode(node)[2]
-    with contextlib.closing(connect(uri, topic, '/subscriber')) as connection:
+    _code, _text, (_protocol, *address) = ServerProxy(uri).requestTopic('/subscriber', topic, [['TCPROS']])
+    with contextlib.closing(socket.create_connection(address)) as connection:
+        write_ros_handshake_header(connection, {'callerid': '/subscriber', 'topic': topic, 'type': '*', 'md5sum': '*'})
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         wait_until(lambda: any(entry[1] == '/subscriber' and entry[4] == topic for entry in ServerProxy(uri).getBusInfo(
             '/subscriber')[2]), 'the connection of a subscriber of ' + topic)

@@ -7,14 +7,14 @@ import tempfile
 from typing import NamedTuple
 
 from ros_3d_bb_lab.evaluation.defaults import default_weights, describe_machine, in_range, scenario_path
-from ros_3d_bb_lab.evaluation.latency.latency_result import LIMIT, result_of
+from ros_3d_bb_lab.evaluation.latency.latency_result import result_of
 from ros_3d_bb_lab.evaluation.launching import recorded
 from ros_3d_bb_lab.evaluation.text_table import line_of, table_of
 
 IMAGES = 60  # first images of the demo, played forwards and backwards: 2 s, 90 MB
 BUSY_LOOP = 'import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n    pass'
 # Nodes of the benchmark, which do not run on a robot.
-HARNESS = 'replay_node', 'latency_probe_node', 'rosout', 'limit_audience'
+HARNESS = 'replay_node', 'latency_probe_node', 'rosout'
 
 
 class Case(NamedTuple):
@@ -43,13 +43,12 @@ def measured(case, arguments, bag, folder):
     Raises RuntimeError if nothing was measured.
     """
     options = {'bag': bag, 'detector': case.detector, 'weights': case.weights, 'image_size': case.image_size,
-               'seconds': arguments.seconds, 'rate': arguments.rate, 'single_process': not arguments.separate,
-               'limits': arguments.limits, 'warm_up': 8.0 if arguments.limits else 3.0}
+               'seconds': arguments.seconds, 'rate': arguments.rate, 'single_process': not arguments.separate}
     with cpu_load(int(case.loaded)):
         record = recorded('latency.launch', options, os.path.join(folder, case.name), arguments.seconds + 200)
     result = dict(name=case.name, detector=case.name.split('+')[0], load='one core' if case.loaded else 'none')
     result.update(result_of(record), load_average=record['load_average'])
-    nodes = [node for node in result['cpu_percent'] if node not in HARNESS and not node.endswith(LIMIT)]
+    nodes = [node for node in result['cpu_percent'] if node not in HARNESS]
     return dict(result, pipeline={key: sum(result[key][node] for node in nodes) for key in ('cpu_percent', 'rss_mb')})
 
 
@@ -71,8 +70,7 @@ def print_result(result):
                      if not isinstance(value, dict)}))
     grew = result['trend']['rss_mb_per_minute']
     print('\n'.join(table_of({node: {'cpu_percent': result['cpu_percent'][node], 'rss_mb': result['rss_mb'][node],
-                                     'rss_mb_per_minute': grew[node],
-                                     'times_limit': result['nodes'].get(node, {}).get('times_limit')}
+                                     'rss_mb_per_minute': grew[node]}
                               for node in sorted(result['cpu_percent'])})))
     print(line_of('median ms from stamp:', **result['stages_ms']))
     for end in ('first', 'last'):
@@ -98,8 +96,6 @@ def run(arguments):
 
 def _cases(arguments):
     """The cases that the arguments select. Raises ValueError."""
-    if arguments.limits and not arguments.separate:
-        raise ValueError('--limits compares single nodes; expected together with --separate')
     known = {case.name: case for case in cases_of([os.path.abspath(path) for path in arguments.weights])}
     names = arguments.cases.split(',') if arguments.cases else list(known)
     for name in names:
@@ -121,7 +117,4 @@ def add_options(parser):
                         'file without suffix (default: yolov5n.pt in the cache, if any)')
     parser.add_argument('--bag', help='bag written by scenario_to_bag or session_to_bag with --boxes (default: the '
                         'first %d images of the demo)' % IMAGES)
-    parser.add_argument('--limits', action='store_true',
-                        help='also give the CPU usage of each node as a multiple of its limit: that of a bare rospy '
-                        'node that runs beside it, receives the same messages and publishes messages of the same size')
     parser.add_argument('--separate', action='store_true', help='run each node in a process of its own')

@@ -20,6 +20,7 @@ from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe
 from ros_3d_bb_lab.evaluation.latency.latency_result import STAGES
 
 START_TIMEOUT_S = 120.0  # includes the time for exporting the network of a detector
+WARM_UP_S = 3.0  # from the first markers to the measurement
 SAMPLE_S = 1.0
 GRACE_S = 1.0  # waiting time for results of the last images
 OUTPUTS = ((BOXES_TOPIC, Int32MultiArray), (BOXES3D_TOPIC, BoundingBox3DArray), (TRACKS_TOPIC, TrackedObjectArray),
@@ -32,7 +33,6 @@ class LatencyProbeParams(NamedTuple):
 
     record: str = Param('')
     seconds: float = Param(20.0)
-    warm_up: float = Param(3.0)
 
 
 class LatencyProbeNode(object):
@@ -62,7 +62,7 @@ class LatencyProbeNode(object):
             if time.monotonic() > deadline_s:
                 raise ValueError('no markers within %.0f s' % START_TIMEOUT_S)
             time.sleep(0.1)
-        time.sleep(self._params.warm_up)
+        time.sleep(WARM_UP_S)
         pids, began_s = pids_of_nodes(), time.time()
         usage = {node: [] for node in pids}
         while not rospy.is_shutdown():

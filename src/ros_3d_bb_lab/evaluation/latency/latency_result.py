@@ -2,8 +2,6 @@
 import numpy as np
 
 STAGES = 'boxes_2d', 'boxes_3d', 'tracks', 'markers'  # in processing order
-LIMIT = '_limit'  # suffix of the node with the topics of another, see `rospy_limit`
-LEAST_PERCENT = 0.01  # CPU usage, so that a limit without any is not divided by
 EDGE_S = 60.0  # intervals at the start and at the end that are compared in `trend`
 
 
@@ -17,7 +15,7 @@ def result_of(record):
     Latencies of the result are from the stamp to the arrival of the markers, CPU usage is in percent of a core, memory
     is that at the end. `stages_ms`: median latency by stage. `trend`: `first` and `last` minute (or half of the
     measurement, if that is shorter), and the memory growth of the second half, because caches are filled in the first
-    minute. `nodes`: see `compared_with_limits`.
+    minute.
     """
     began_s, ended_s = record['began_s'], record['ended_s']
     window_s = ended_s - began_s
@@ -32,23 +30,12 @@ def result_of(record):
     result['cpu_percent'] = {node: float(100 * (rows[-1, 1] - rows[0, 1]) / (rows[-1, 0] - rows[0, 0]))
                              for node, rows in samples.items()}
     result['rss_mb'] = {node: float(rows[-1, 2]) for node, rows in samples.items()}
-    result['nodes'] = compared_with_limits(result['cpu_percent'])
     edge_s = min(EDGE_S, window_s / 2)
     first, last = answered[:, 0] < began_s + edge_s, answered[:, 0] >= ended_s - edge_s
     result['trend'] = {
         'rss_mb_per_minute': {node: _growth(rows[len(rows) // 2 - 1:]) for node, rows in samples.items()},
         'edge_s': edge_s, 'first': percentiles(answered[first, 1]), 'last': percentiles(answered[last, 1])}
     return result
-
-
-def compared_with_limits(cpu_percent):
-    """CPU usage of each node that has a limit, {node: dictionary}, from that of all nodes, in percent of a core.
-
-    `limit_percent` is that of a bare rospy node with the same topics, `times_limit` the usage divided by this limit.
-    """
-    return {node: {'cpu_percent': percent, 'limit_percent': cpu_percent[node + LIMIT],
-                   'times_limit': percent / max(cpu_percent[node + LIMIT], LEAST_PERCENT)}
-            for node, percent in cpu_percent.items() if node + LIMIT in cpu_percent}
 
 
 def latencies(sent_ns, arrivals):
