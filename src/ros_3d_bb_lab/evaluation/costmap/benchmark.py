@@ -82,13 +82,10 @@ def _is_visible(person, frame, range_m):
 
 
 class Player(object):
-    """Plays scenes to the nodes and collects their costmaps. `rospy.init_node` must have been called.
-
-    Attribute `start_ns`: stamp of the first image of the last scene.
-    """
+    """Plays scenes to the nodes and collects their costmaps. `rospy.init_node` must have been called."""
 
     def __init__(self):
-        self._now_ns, self._grids, self.start_ns = START_NS, [], START_NS
+        self._now_ns, self._grids = START_NS, []
         self._clock_pub = rospy.Publisher('/clock', Clock, queue_size=100)
         self._tf_pub = rospy.Publisher('/tf', TFMessage, queue_size=100)
         self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=100)
@@ -106,8 +103,9 @@ class Player(object):
     def play(self, scene):
         """Play a scene. Returns its costmaps, a list of Costmap."""
         self._now_ns += GAP_NS
-        self._lead(scene)
-        self.start_ns = self._now_ns
+        for _tick in range(int(LEAD_S / TICK_S)):  # so that tf begins before the first image
+            self._tick(scene, 0.0, True)
+        start_ns = self._now_ns
         del self._grids[:]
         waiting = list(scene.steps)
         for number in range(int(scene.simulator.scenario.duration / TICK_S)):
@@ -116,23 +114,9 @@ class Player(object):
                        number % round(ODOM_S / TICK_S) == 0)
             while waiting and waiting[0].frame.time_s + LATENCY_S <= seconds:
                 step = waiting.pop(0)
-                header = Header(stamp=time_from(self.start_ns + int(step.frame.time_s * NS)), frame_id=MAP_FRAME)
+                header = Header(stamp=time_from(start_ns + int(step.frame.time_s * NS)), frame_id=MAP_FRAME)
                 self._tracks_pub.publish(tracks_to_msg(step.moment.tracks, header))
-        return self.costmaps_of(scene, self._grids)
-
-    def score(self, scene, costmaps):
-        """Score the costmaps of a scene, see `score_costmaps`."""
-        return score_costmaps(costmaps, sightings_of(scene), scene.simulator.positions_at)
-
-    def costmaps_of(self, scene, grids):
-        """Convert the OccupancyGrids since the start of the scene to Costmaps."""
-        return [_costmap(scene, grid, self.start_ns) for grid in grids
-                if grid.header.stamp.to_nsec() >= self.start_ns]
-
-    def _lead(self, scene):
-        """Play the first moment of a scene, so that tf begins before the first image."""
-        for _tick in range(int(LEAD_S / TICK_S)):
-            self._tick(scene, 0.0, True)
+        return [_costmap(scene, grid, start_ns) for grid in self._grids if grid.header.stamp.to_nsec() >= start_ns]
 
     def _tick(self, scene, seconds, with_map, with_odom=True):
         stamp = time_from(self._now_ns)
@@ -160,28 +144,24 @@ def _costmap(scene, grid, start_ns):
                    scene.simulator.poses_at(seconds).map_from_odom)
 
 
-def play_scenes(paths, launch, make_player, yolov5=None):
-    """Score the costmaps of each scenario, in a file, with the nodes of `launch` (XML) and the Player that is made."""
+def run(arguments):
+    """Score the costmaps of each scene."""
     print(describe_machine(), flush=True)
-    scenes = [tracked_scene(path, yolov5) for path in paths]
+    yolov5 = yolov5_detector(arguments.weights) if arguments.weights else None
+    scenes = [tracked_scene(path, yolov5) for path in arguments.scenarios]
     results, port = {}, free_port()
     os.environ['ROS_MASTER_URI'] = 'http://localhost:%d' % port
     with running_roslaunch(['-'], port, sys.stderr, stdin=subprocess.PIPE) as process:
         with process.stdin as stream:
-            stream.write(launch.encode())
+            stream.write(LAUNCH.encode())
         rospy.init_node('costmap_benchmark', disable_signals=True)
-        player = make_player()
+        player = Player()
         player.start(scenes[0])
         for scene in scenes:
-            results[scene.name] = player.score(scene, player.play(scene))
+            costmaps = player.play(scene)
+            results[scene.name] = score_costmaps(costmaps, sightings_of(scene), scene.simulator.positions_at)
             print(line_of(scene.name, **results[scene.name]), flush=True)
     return {'machine': describe_machine(), 'scenes': results}
-
-
-def run(arguments):
-    """Score the costmaps of each scene."""
-    yolov5 = yolov5_detector(arguments.weights) if arguments.weights else None
-    return play_scenes(arguments.scenarios, LAUNCH, Player, yolov5)
 
 
 def add_options(parser):
