@@ -14,12 +14,12 @@ from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray
 
-from fuzz.hostile import good_messages, transforms
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC as DEPTH, INFO_TOPICS, TYPES
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC as BOXES
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.doctor import graph_findings
 from ros_3d_bb_lab.evaluation.launching import free_port, running_roslaunch
+from support.inputs import good_messages, transforms
 from support.ros import Recorder, wait_until
 
 INFO, KINDS = INFO_TOPICS[0], dict(TYPES, **{BOXES: Int32MultiArray})

@@ -7,12 +7,12 @@ import rospy
 from rosgraph_msgs.msg import Log
 from std_srvs.srv import SetBool, SetBoolResponse
 
-from fuzz.hostile import good_messages
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb_lab.evaluation.launching import running
+from support.inputs import good_messages
 from support.ros import Recorder, publisher, wait_until
 from support.screen import press, start_screen
 

@@ -8,8 +8,6 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBoolRequest
 
-from fuzz.hostile import CAMERA, good_messages, transforms
-from fuzz.nodes import send_image
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg,
@@ -36,6 +34,7 @@ from ros_3d_bb.visualization.markers import AREA, MARKERS_TOPIC, MarkerParams
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
+from support.inputs import CAMERA, good_messages, send_image, transforms
 from support.launching import loaded
 from support.masterless import masterless
 from support.ros import depth_message, header_at, wait_until

@@ -1,7 +1,6 @@
 """Generated pages and files agree with the code, and so do README and doc/. test_readme_*.py run their commands."""
 import ast
 import contextlib
-import functools
 import glob
 import os
 import re
@@ -14,13 +13,13 @@ from unittest import mock
 import pytest
 import yaml
 
-from fuzz.nodes import TARGETS, send_image
 from ros_3d_bb.core.params import SET_BY_LAUNCH, table_of
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.people_node import PeopleNode
 from ros_3d_bb.nodes.realsense_node import RealSenseNode
 from ros_3d_bb_lab.simulation.ros.simulator_node import SimulatorNode
 from support.code_blocks import PAGES
+from support.inputs import TARGETS, send_image
 from support.masterless import masterless
 from support.pages import DOC, ROOT, figures, node_pages
 from support.planner_definitions import package
@@ -29,7 +28,7 @@ CONFIG = node_pages.config_files()
 NODES = {node.name: node for node in node_pages.nodes()}
 USED = set(name for name, node in NODES.items() if 'evaluation' not in node.node_class.__module__)  # not by benchmarks
 SCENARIO = os.path.join(ROOT, 'config', 'scenarios', 'empty_room.yaml')
-# Parameters with which nodes connect to all their topics; the other nodes are created as by the fuzzer.
+# Parameters with which nodes connect to all their topics; the other nodes are created as `TARGETS`.
 MORE_PARAMS = {'planner_bridge_node': {'outputs': 'costmap, people, teb, mpc, vision'},
                'tracker_node': {'use_map': True}, 'speed_limit_node': {'use_scan': True},
                'realsense_node': {'publish_clock': True},
@@ -45,7 +44,7 @@ def connected(name):
     if name in OTHERS:
         params, make = {}, OTHERS[name]
     else:
-        params, make = TARGETS[name].params, functools.partial(TARGETS[name].make, None)
+        params, make = TARGETS[name].params, TARGETS[name].make
     with masterless(dict(params, **MORE_PARAMS.get(name, {}))) as connections, \
             mock.patch.dict(sys.modules, stand_ins), mock.patch('threading.Thread.start'):
         node = make()

@@ -5,7 +5,6 @@ from hypothesis import given, strategies as st
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 
-from fuzz.hostile import transforms as transforms_at
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.conversions.camera_msgs import CameraFrame, info_of_images, info_topic_beside, messages_of
@@ -16,6 +15,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObject
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, TrackedObject as Track, detections_from_boxes
+from support.inputs import transforms as transforms_at
 from support.masterless import on_the_wire
 from support.people import mounted
 from support.ros import header_at

@@ -6,7 +6,6 @@ from sensor_msgs.msg import Image, LaserScan, PointCloud2, PointField
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
-from fuzz.hostile import transforms
 from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, time_from, tracks_to_msg
@@ -18,6 +17,7 @@ from ros_3d_bb.nodes.follow_node import RESENT_S, FollowNode
 from ros_3d_bb.nodes.people_removal_node import PeopleRemovalNode
 from ros_3d_bb.nodes.speed_limit_node import SpeedLimitNode
 from support.compressed import compressed
+from support.inputs import transforms
 from support.masterless import masterless, on_the_wire
 from support.ros import camera_info, person
 from support.tracks import track_at

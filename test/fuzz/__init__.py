@@ -1,1 +1,0 @@
-"""Invalid input for parsers, conversions and the callbacks of nodes: `./run fuzz`."""
