@@ -4,14 +4,12 @@ import contextlib
 import glob
 import os
 import re
-import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 from unittest import mock
 
 import pytest
-import yaml
 
 from ros_3d_bb.core.params import SET_BY_LAUNCH, table_of
 from ros_3d_bb.core.time_sync import NS
@@ -21,7 +19,7 @@ from ros_3d_bb_lab.simulation.ros.simulator_node import SimulatorNode
 from support.code_blocks import PAGES
 from support.inputs import TARGETS, send_image
 from support.masterless import masterless
-from support.pages import DOC, ROOT, figures, node_pages
+from support.pages import DOC, ROOT, node_pages
 from support.planner_definitions import package
 
 CONFIG = node_pages.config_files()
@@ -98,8 +96,6 @@ def test_the_site_has_every_page_and_each_link_has_a_target(tmp_path):
 
 
 FORMAT = re.compile(r'%[-+\d.]*[a-zA-Z]')
-with open(os.path.join(ROOT, 'doc', 'figures.yaml'), encoding='utf-8') as _stream:
-    FIGURES = yaml.safe_load(_stream)
 
 
 def text_of(path):
@@ -147,34 +143,11 @@ def test_the_table_of_live_parameters_agrees_with_the_code():
     assert not any(param.live for kinds in types.values() for param in table_of(kinds).values())
 
 
-@pytest.mark.parametrize('name', sorted(FIGURES))
-def test_pages_quote_the_measured_figure(name):
-    for page, quote in FIGURES[name]['quotes'].items():
-        assert ' '.join(text_of(page).split()).count(quote.format(FIGURES[name]['value'])) == 1, page
-
-
-def test_a_new_measurement_is_written_to_the_pages(tmp_path):
-    for page in ['doc/figures.yaml'] + [page for figure in FIGURES.values() for page in figure['quotes']]:
-        (tmp_path / page).parent.mkdir(exist_ok=True)
-        shutil.copy(os.path.join(ROOT, page), str(tmp_path / page))
-    hota, ahead_m = {'ours': 84.26, 'thesis': 50.0, 'library': 78.1}, {'ours': 0.504, 'library': 0.604}
-    result = {'trackers': {name: {'hota': hota[name], 'fde_2s_m': ahead_m.get(name)} for name in hota},
-              'command': './run bench tracking --json some.json'}
-    written = figures.write(result, str(tmp_path))
-    assert written == ['hota', 'hota_thesis', 'hota_norfair', 'prediction_2s_m', 'prediction_2s_norfair_m']
-    assert 'HOTA **84.3** (Norfair **78.1**, thesis **50.0**)' in (tmp_path / 'README.md').read_text(encoding='utf-8')
-    new = yaml.safe_load((tmp_path / 'doc' / 'figures.yaml').read_text(encoding='utf-8'))
-    assert [new[name]['value'] for name in written] == [84.3, 50.0, 78.1, 0.5, 0.6]
-    for command in ('./run bench tracking --seed 1', './run bench tracking --rates', './run bench prediction'):
-        assert figures.write(dict(result, command=command), str(tmp_path)) == []
-
-
-def test_each_bold_figure_of_the_readme_is_a_measured_one():
+def test_each_bold_figure_of_the_readme_is_in_the_benchmarks():
     section = text_of('README.md').split('## Accuracy and speed\n')[1].split('\n## ')[0]
-    quotes = [figure['quotes']['README.md'].format(figure['value']) for figure in FIGURES.values()
-              if 'README.md' in figure['quotes']]
-    bold = re.findall(r'\*\*[\d.]+', section)
-    assert len(bold) >= 10 and [each for each in bold if not any(each in quote for quote in quotes)] == []
+    quoted = re.findall(r'\*\*([\d.]+)', section)
+    measured = re.findall(r'[\d.]+', text_of('doc/benchmarks.md'))
+    assert len(quoted) >= 10 and set(quoted) <= set(measured)
 
 
 @pytest.mark.parametrize('page', PAGES)
