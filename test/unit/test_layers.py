@@ -50,9 +50,6 @@ ALLOWED = {
     'ros_3d_bb_lab.evaluation.navigation': (
         'camera conversions core msg nodes.common tracking lab.evaluation lab.simulation lab.simulation.ros',
         'ros yaml'),
-    'ros_3d_bb_lab.evaluation.costmap': (
-        'camera conversions core estimation msg tracking lab.evaluation lab.simulation lab.simulation.ros',
-        'ros'),
     'ros_3d_bb_lab.evaluation.gazebo': (
         'bags conversions core tracking lab.evaluation lab.simulation', 'messages rosbag'),
     'ros_3d_bb_lab.evaluation.latency': ('bags conversions core msg nodes.common lab.evaluation', 'ros')}

@@ -12,8 +12,7 @@ import sys
 
 MODULES = {'accuracy': 'accuracy', 'tracking': 'tracking.benchmark', 'prediction': 'tracking.prediction_benchmark',
            'scenes': 'scene_benchmark', 'speed': 'speed', 'latency': 'latency.benchmark',
-           'detector': 'detector_benchmark', 'costmap': 'costmap.benchmark',
-           'navigation': 'navigation.benchmark', 'gazebo': 'gazebo.benchmark'}
+           'detector': 'detector_benchmark', 'navigation': 'navigation.benchmark', 'gazebo': 'gazebo.benchmark'}
 
 
 def main(words):

@@ -29,10 +29,10 @@ def recorded(name, arguments, path, timeout_s):
         raise RuntimeError('%s: no result. The end of the log:\n%s' % (os.path.basename(path), end))
 
 
-def running_roslaunch(arguments, port, log, **options):
-    """Context in which roslaunch runs with its own master, and options of Popen."""
+def running_roslaunch(arguments, port, log):
+    """Context in which roslaunch runs with its own master."""
     return running(['roslaunch', '-p', str(port)] + arguments, stdout=log, stderr=subprocess.STDOUT,
-                   env=dict(os.environ, ROS_MASTER_URI='http://localhost:%d' % port), **options)
+                   env=dict(os.environ, ROS_MASTER_URI='http://localhost:%d' % port))
 
 
 @contextlib.contextmanager
