@@ -21,7 +21,6 @@ def test_modes_differ_in_what_move_base_knows_of_people(mode):
     is_tracked = mode in ('ours', 'limited')
     assert {'bbox3d_node', 'tracker_node'} & set(nodes) == ({'bbox3d_node', 'tracker_node'} if is_tracked else set())
     assert parameters['/simulator_node/boxes'] == is_tracked
-    assert (['ground_truth', 'ros_3d_bb/tracks'] in nodes['simulator_node'].remap_args) == (mode == 'truth')
     layers = [layer['name'] for layer in parameters['/move_base/local_costmap/plugins']]
     assert layers == ['static_layer'] + {
         mode: ['obstacle_layer', 'inflation_layer'] for mode in ('depth', 'laser', 'none')}.get(
