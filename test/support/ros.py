@@ -4,7 +4,6 @@ import time
 
 import numpy as np
 import rospy
-from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
@@ -101,15 +100,3 @@ def person(number, x, y, moving=True, speed=1.0):
     """The message of a track that walks along x of the map, predicted for 2 s."""
     track = track_at((x, y, 0.85), (speed, 0, 0), moving=moving, number=number)
     return tracks_to_msg([track._replace(size_m=np.array([0.6, 0.6, 1.7]))], Header()).objects[0]
-
-
-def diagnostics_of(node, timeout_s=TIMEOUT_S):
-    """The next diagnostic status of a node: (level, message, {event: count}, with further values as text)."""
-    with Recorder('/diagnostics', DiagnosticArray) as recorder:
-        def received():
-            return [status for message in recorder.messages for status in message.status
-                    if status.name.startswith(node)]
-        wait_until(received, 'diagnostics of ' + node, timeout_s)
-        status = received()[-1]
-    return status.level, status.message, {
-        entry.key: int(entry.value) if entry.value.isdigit() else entry.value for entry in status.values}

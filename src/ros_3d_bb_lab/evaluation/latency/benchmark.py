@@ -65,16 +65,12 @@ def cpu_load(cores):
 
 
 def print_result(result):
-    """Print a result: a line, a table of the nodes, the latency by stage, and the trend."""
+    """Print a result: a line, a table of the nodes, and the latency by stage."""
     print(line_of(**{key: value for key, value in dict(result, **result['pipeline']).items()
                      if not isinstance(value, dict)}))
-    grew = result['trend']['rss_mb_per_minute']
-    print('\n'.join(table_of({node: {'cpu_percent': result['cpu_percent'][node], 'rss_mb': result['rss_mb'][node],
-                                     'rss_mb_per_minute': grew[node]}
+    print('\n'.join(table_of({node: {'cpu_percent': result['cpu_percent'][node], 'rss_mb': result['rss_mb'][node]}
                               for node in sorted(result['cpu_percent'])})))
-    print(line_of('median ms from stamp:', **result['stages_ms']))
-    for end in ('first', 'last'):
-        print(line_of('%s %.0f s:' % (end, result['trend']['edge_s']), **result['trend'][end]), flush=True)
+    print(line_of('median ms from stamp:', **result['stages_ms']), flush=True)
 
 
 def run(arguments):

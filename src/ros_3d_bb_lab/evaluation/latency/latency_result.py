@@ -2,7 +2,6 @@
 import numpy as np
 
 STAGES = 'boxes_2d', 'boxes_3d', 'tracks', 'markers'  # in processing order
-EDGE_S = 60.0  # intervals at the start and at the end that are compared in `trend`
 
 
 def result_of(record):
@@ -13,9 +12,7 @@ def result_of(record):
     clock. Only images with a stamp during the measurement are evaluated.
 
     Latencies of the result are from the stamp to the arrival of the markers, CPU usage is in percent of a core, memory
-    is that at the end. `stages_ms`: median latency by stage. `trend`: `first` and `last` minute (or half of the
-    measurement, if that is shorter), and the memory growth of the second half, because caches are filled in the first
-    minute.
+    is that at the end. `stages_ms`: median latency by stage.
     """
     began_s, ended_s = record['began_s'], record['ended_s']
     window_s = ended_s - began_s
@@ -24,27 +21,21 @@ def result_of(record):
     answered = stages[STAGES[-1]]
     result = {'input_hz': len(sent_ns) / window_s, 'output_hz': len(answered) / window_s,
               'dropped': len(sent_ns) - len(answered)}
-    result.update(percentiles(answered[:, 1]))
-    result['stages_ms'] = {stage: percentiles(found[:, 1])['p50_ms'] for stage, found in stages.items()}
+    result.update(percentiles(answered))
+    result['stages_ms'] = {stage: percentiles(found)['p50_ms'] for stage, found in stages.items()}
     samples = {node: np.array(rows) for node, rows in record['usage'].items() if len(rows) > 1}
     result['cpu_percent'] = {node: float(100 * (rows[-1, 1] - rows[0, 1]) / (rows[-1, 0] - rows[0, 0]))
                              for node, rows in samples.items()}
     result['rss_mb'] = {node: float(rows[-1, 2]) for node, rows in samples.items()}
-    edge_s = min(EDGE_S, window_s / 2)
-    first, last = answered[:, 0] < began_s + edge_s, answered[:, 0] >= ended_s - edge_s
-    result['trend'] = {
-        'rss_mb_per_minute': {node: _growth(rows[len(rows) // 2 - 1:]) for node, rows in samples.items()},
-        'edge_s': edge_s, 'first': percentiles(answered[first, 1]), 'last': percentiles(answered[last, 1])}
     return result
 
 
 def latencies(sent_ns, arrivals):
-    """Stamp in seconds and latency in ms, (n, 2), of the images with an arrival; the first arrival counts."""
+    """Latencies (n,) in ms of the images with an arrival; the first arrival counts."""
     arrived_s = {}
     for stamp_ns, arrival_s in arrivals:
         arrived_s.setdefault(stamp_ns, arrival_s)
-    return np.array([(stamp_ns * 1e-9, (arrived_s[stamp_ns] - stamp_ns * 1e-9) * 1e3)
-                     for stamp_ns in sent_ns if stamp_ns in arrived_s]).reshape(-1, 2)
+    return np.array([(arrived_s[stamp_ns] - stamp_ns * 1e-9) * 1e3 for stamp_ns in sent_ns if stamp_ns in arrived_s])
 
 
 def percentiles(values_ms):
@@ -52,8 +43,3 @@ def percentiles(values_ms):
     if not len(values_ms):
         return {'p50_ms': None, 'p95_ms': None, 'p99_ms': None}
     return {'p%d_ms' % share: float(np.percentile(values_ms, share)) for share in (50, 95, 99)}
-
-
-def _growth(rows):
-    """Slope of memory in MB per minute; `rows` as in a record, at least two."""
-    return float(np.polyfit(rows[:, 0] - rows[0, 0], rows[:, 2], 1)[0] * 60)
