@@ -1,7 +1,5 @@
 # ./run demo: a simulated robot among walking people. Sourced by ./run.
 
-weights_sha256=4f180cf23ba0717ada0badd6c685026d73d48f184d00fc159c2641284b2ac0a3  # of yolov5n.pt, YOLOv5 release 6.1
-
 demo() {
   local scenario=demo weights='' rate=0
   [ -f "$weights_default" ] && weights=$weights_default
@@ -22,7 +20,6 @@ demo() {
   [ -f "$file" ] || file=$(realpath -e "$scenario" 2> /dev/null) || fail "there is no scenario '$scenario'"
   local options=("scenario:=$file" "rate:=$rate")
   if [ -n "$weights" ]; then
-    check_weights "$weights"
     options+=(detector:=yolov5 "weights:=$weights")
   fi
   build
@@ -41,15 +38,6 @@ print(",".join(mount.name for mount in read_scenario(sys.argv[1]).robot.cameras)
   fi
   say "no screen (DISPLAY is not set): the scene once, and a report of it"
   demo_without_screen "${options[@]}"
-}
-
-# A file that calls itself yolov5n.pt has to be the one of release 6.1 that this package is tested with.
-check_weights() {
-  local sum; sum=$(sha256sum "$1" | cut -d ' ' -f 1)
-  [ "$(basename "$1")" != yolov5n.pt ] || [ "$sum" = "$weights_sha256" ] || {
-    echo "./run demo: $1 has SHA-256 $sum; yolov5n.pt of release 6.1 has $weights_sha256." >&2
-    echo "Download it again, or rename the file if it is meant to be another one." >&2
-    exit 1; }
 }
 
 demo_without_screen() {
