@@ -70,13 +70,13 @@ def test_3d_boxes_do_not_wait_for_a_master_to_subscribe_colour():
             mock.patch('ros_3d_bb.nodes.bbox3d_node.patient_master', side_effect=OSError('no route')) as query:
         publisher.return_value.get_num_connections.return_value = 1
         diagnostics = mock.MagicMock()
-        frame = mock.Mock(received=mock.Mock(depth=DepthImage(np.zeros((4, 4), np.uint16), 0.001)))
+        depth = DepthImage(np.zeros((4, 4), np.uint16), 0.001)
         images = SampleImages(Bbox3dParams(), None, diagnostics)
-        images.publish(Header(), frame, [])
+        images.publish(Header(), depth, [])
         wait_until(lambda: diagnostics.warn.called, 'a warning')
         assert 'no route' in diagnostics.warn.call_args[0][1] and not subscriber.called
         query.side_effect = None
-        images.publish(Header(), frame, [])
+        images.publish(Header(), depth, [])
         wait_until(lambda: subscriber.called, 'a subscription')
 
 
