@@ -100,7 +100,7 @@ def test_a_person_too_near_for_the_weight_free_detector_stays_tracked(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize('seed', range(4))
-def test_a_robot_that_drives_up_to_a_person_keeps_whose_legs_it_sees(seed):
+def test_a_robot_that_drives_up_to_a_person_keeps_the_track(seed):
     """The camera of a Jackal. From 1.6 m on, where the image shows legs alone, the detector misses them."""
     simulator = Simulator(scenario_from({
         'duration': 9.0, 'rate': 10.0, 'seed': seed, 'people': [{'start': [4.0, 0.05], 'facing': 1.5 * seed}],

@@ -89,7 +89,7 @@ class RgbdFrame(NamedTuple):
     @property
     def received(self):
         """The frame as received, before it was turned upright."""
-        return self.turned(-self.turns) if self.turns else self
+        return self.turned(-self.turns)
 
     def turned(self, turns):
         """The frame turned by some clockwise quarter turns."""
@@ -105,8 +105,6 @@ class RgbdFrame(NamedTuple):
 
     def upright_rects(self, rects_px):
         """Rectangles (n, 4) of the received image in the upright image. Inverse of `received_rects`."""
-        if not self.turns:
-            return rects_px
         return turned_boxes(rects_px, self.turns, *turned_camera(self.camera, -self.turns)[:2])
 
     def received_rects(self, rects_px):

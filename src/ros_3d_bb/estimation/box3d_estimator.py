@@ -113,7 +113,7 @@ def estimate_boxes(depth, rects_px, camera, estimator, level_from_camera=LEVEL, 
     geometry = ImageGeometry(camera, depth.measured_area(), tuple(map(tuple, level_from_camera.tolist())))
     boxes = estimator.estimate(depth, rects_px, geometry, list(map(estimator.classes.of, labels)))
     for number, label in enumerate(labels):
-        if boxes[number] is not None and label != PERSON:
+        if boxes[number] is not None and label != boxes[number].label:
             boxes[number] = boxes[number]._replace(label=label)
     return boxes
 

@@ -41,7 +41,7 @@ class TrackerNode(object):
     camera/color/camera_info : sensor_msgs/CameraInfo
         Calibration, used to determine which tracks are out of view.
     camera/aligned_depth_to_color/image_raw : sensor_msgs/Image
-        Depth image, used to determine which tracks are occluded; not without ~use_depth.
+        Depth image, used to determine which tracks are occluded; only with ~use_depth.
     map : nav_msgs/OccupancyGrid
         Static map in ~target_frame, in whose occupied cells no track starts; only with ~use_map.
     /tf,/tf_static : tf2_msgs/TFMessage

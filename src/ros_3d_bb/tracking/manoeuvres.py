@@ -53,11 +53,11 @@ def match_manoeuvres(tracks, measurements, matches, latest_ns, stamp_ns, height_
                 pairs.append((track, near[0]))
     for track, measurement in pairs:
         elapsed_s = (stamp_ns - track.last_ns) / NS
-        shift_m, is_slow = _distance_m(track.latest, measurement), elapsed_s >= HIT_CORRELATION_S
-        if is_slow and _distance_m(track.state, measurement) < shift_m:
+        shift_m = _distance_m(track.latest, measurement)
+        if elapsed_s >= HIT_CORRELATION_S:
+            if _distance_m(track.state, measurement) >= shift_m:
+                track.state = track.state._replace(x=track.latest.x, y=track.latest.y, u=0.0, v=0.0)
             shift_m = _distance_m(track.state, measurement)
-        elif is_slow:
-            track.state = track.state._replace(x=track.latest.x, y=track.latest.y, u=0.0, v=0.0)
         speed_mps = max(shift_m - BESIDE_M, 0) / elapsed_s
         track.state = faster(track.state, elapsed_s, speed_mps ** 2)
     return pairs

@@ -105,6 +105,10 @@ class _End(NamedTuple):
     hits: int
     cut_ns: int
 
+    def was_cut(self, stamp_ns):
+        """Whether this end was truncated within `CUT_LASTS_NS` before a stamp."""
+        return stamp_ns - self.cut_ns < CUT_LASTS_NS
+
 
 class LatestBox(NamedTuple):
     """Position of the latest detection, and the height of its upper end, or of the image border that truncates it;
@@ -273,10 +277,10 @@ class Track(object):
 
 def _end_after(end, is_cut, stamp_ns):
     """The _End after a detection, and whether it moves with the other one."""
-    if not is_cut and end.hits >= SMOOTHED_HITS and end.cut_ns < stamp_ns - CUT_LASTS_NS:
+    if not is_cut and end.hits >= SMOOTHED_HITS and not end.was_cut(stamp_ns):
         return end, False  # further detections make no difference
     cut_ns = stamp_ns if is_cut else end.cut_ns
-    was_cut = not is_cut and stamp_ns - cut_ns < CUT_LASTS_NS
+    was_cut = not is_cut and end.was_cut(stamp_ns)
     hits = end.hits + (not is_cut and not was_cut)
     return _End(hits, cut_ns), was_cut or is_cut and hits > 0
 
