@@ -231,21 +231,6 @@ def _are_same(track, other):
     return distance_m < SAME_PERSON_M and track.kind.group == other.kind.group
 
 
-def match_greedily(distances):
-    """Pair rows with columns of `distances` (n, m) greedily (thesis 3.6). Each row and column is used at most once.
-
-    Returns a list of min(n, m) pairs (row, column) by increasing distance; ties are ordered by row, then column.
-    """
-    distances = np.asarray(distances, float)
-    pairs, rows, columns = [], set(), set()
-    for row, column in zip(*np.unravel_index(np.argsort(distances, axis=None, kind='mergesort'), distances.shape)):
-        if row not in rows and column not in columns:
-            pairs.append((int(row), int(column)))
-            rows.add(row)
-            columns.add(column)
-    return pairs
-
-
 def plane_distances(positions, others):
     """Distances (n, m) in the x-y plane between points (n, 3) and (m, 3), metres."""
     difference = np.asarray(positions, float)[:, None, :2] - np.asarray(others, float)[None, :, :2]

@@ -14,7 +14,7 @@ from ros_3d_bb.detection.depth.ground_plane import floor_from_transform
 from ros_3d_bb.estimation.box3d import plausible
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
-from ros_3d_bb.tracking.association import match_greedily, plane_distances
+from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import VISIBLE, CameraView, detections_from_boxes
@@ -108,7 +108,7 @@ def score_detections(steps, nearest_m, farthest_m, least_visible=0.8):
         shown = [person for person in step.frame.people if person.box_px is not None]
         overlaps = np.array([iou(box, np.array([person.box_px for person in shown])) for box in step.boxes])
         overlaps = overlaps.reshape(len(step.boxes), len(shown))
-        pairs = [pair for pair in match_greedily(-overlaps) if overlaps[pair] >= FOUND_IOU]
+        pairs = [pair for pair in _matched_greedily(-overlaps) if overlaps[pair] >= FOUND_IOU]
         false += len(step.boxes) - len(pairs)
         found_people = set(column for _row, column in pairs)
         camera_from_map = np.linalg.inv(step.frame.poses.map_from_camera)
@@ -118,6 +118,21 @@ def score_detections(steps, nearest_m, farthest_m, least_visible=0.8):
                 people += 1
                 found += column in found_people
     return people, found, false
+
+
+def _matched_greedily(distances):
+    """Pair rows with columns of `distances` (n, m) greedily. Each row and column is used at most once.
+
+    Returns a list of min(n, m) pairs (row, column) by increasing distance; ties are ordered by row, then column.
+    """
+    distances = np.asarray(distances, float)
+    pairs, rows, columns = [], set(), set()
+    for row, column in zip(*np.unravel_index(np.argsort(distances, axis=None, kind='mergesort'), distances.shape)):
+        if row not in rows and column not in columns:
+            pairs.append((int(row), int(column)))
+            rows.add(row)
+            columns.add(column)
+    return pairs
 
 
 def score_tracks(images, horizons_s=(1.0,)):
