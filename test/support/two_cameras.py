@@ -29,13 +29,16 @@ class Transforms(object):
             raise tf2_ros.LookupException('no such frame')
         return transform_from((0, 0, 1), OPTICAL_ROTATION)
 
+    def ancestors(self, frame):
+        return [frame]
+
 
 class Rig(TrackingStage):
     """A stage of some cameras; of a single one without names. Boxes arrive at `now_ns`. Without `camera_timeout`, each
     image has a result."""
 
-    def __init__(self, *cameras, camera_timeout=0.0, **params):
-        self.now_ns, self.transforms, self.events, self._results = 0, Transforms(), EventCounter(), []
+    def __init__(self, *cameras, camera_timeout=0.0, transforms=None, **params):
+        self.now_ns, self.transforms, self.events, self._results = 0, transforms or Transforms(), EventCounter(), []
         params.update(cameras=list(cameras), camera_timeout=camera_timeout)
         super().__init__(TrackerNodeParams(**params), [kind() for kind in TRACKING_PARAMS],
                          self.events, self.transforms, lambda *result: self._results.append(Result(*result)))
@@ -47,7 +50,11 @@ class Rig(TrackingStage):
 
     def send(self, stamp_ns, camera='', frame_id=None, count=1, z=3.0):
         """Equal boxes of one image. Returns the Result, or None."""
-        self.add_boxes(boxes(stamp_ns, frame_id or camera or 'camera', [(0.0, 0.0, z)] * count), self.now_ns, camera)
+        return self.send_boxes(boxes(stamp_ns, frame_id or camera or 'camera', [(0.0, 0.0, z)] * count), camera)
+
+    def send_boxes(self, message, camera=''):
+        """A BoundingBox3DArray. Returns the Result, or None."""
+        self.add_boxes(message, self.now_ns, camera)
         return self._results.pop() if self._results else None
 
 

@@ -97,11 +97,11 @@ def test_boxes_that_never_become_a_track_are_counted():
     """Three boxes, each too far from the one before to be of the same person; then a person who stays."""
     tracker = Tracker()
     play(5, 0.6, lambda time_s: [(3.0, 15.0 * time_s)], tracker)
-    assert not tracker.totals.untracked_boxes  # their tracks are tentative
+    assert not tracker.untracked_boxes  # their tracks are tentative
     play(5, 3.4, lambda _time_s: [(3.0, -3.0)], tracker, 0.6)
-    assert tracker.totals.untracked_boxes == 3
+    assert tracker.untracked_boxes == 3
     tracker.reset()
-    assert not tracker.totals.untracked_boxes
+    assert not tracker.untracked_boxes
 
 
 @pytest.mark.parametrize('gap_s', [5.0, 3600.0, 6.3e7])

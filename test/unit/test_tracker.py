@@ -248,64 +248,6 @@ def test_the_height_of_a_person_is_constant_on_a_slope(slope, cut, height):
     assert published[-1][0].position_m[2] == pytest.approx(0.85 + slope * 7.97, abs=0.05)
 
 
-CROWD = np.array([(2.5, 0.8), (3, -0.6), (3.5, 0.3), (4.5, -1.2), (5, 1)])
-CROWD_MPS = np.array([(0, 0), (0.2, 0.3), (-0.6, 0), (0, 0.8), (0.5, -0.5)])
-
-
-def turned(points, angle):
-    return points.dot([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-
-
-@pytest.mark.parametrize('rate_hz', [5, 30])
-@pytest.mark.parametrize('jump_m,angle', [((0, 0.5), 0), ((0.5, 0), 0), ((-0.35, 0.35), 0), ((0, 0), 0.12),
-                                          ((0.3, 0.2), -0.1)])
-def test_people_keep_their_ids_when_the_odometry_jumps(jump_m, angle, rate_hz):
-    random, tracker = np.random.RandomState(1), Tracker()
-
-    def places(time_s):
-        return turned(CROWD + time_s * CROWD_MPS, angle * (time_s >= 1)) + np.multiply(jump_m, time_s >= 1)
-
-    def detections(time_s):
-        return noisy(random, places(time_s))
-    before = play(tracker, 1, detections, rate_hz)[-1]
-    after = play(tracker, 1, detections, rate_hz, 1, view_from(*jump_m, yaw_deg=np.degrees(angle)))
-    assert ids(before) == [1, 2, 3, 4, 5] and tracker.totals.common_motions == 1
-    for frame, objects in enumerate(after):
-        assert ids(objects) == ids(before)
-        errors_m = np.array([track.position_m[:2] for track in objects]) - places(1 + frame / rate_hz)
-        assert np.linalg.norm(errors_m, axis=1).max() < 0.1
-    speeds_mps = np.array([track.velocity_mps[:2] for track in after[-1]])
-    np.testing.assert_allclose(speeds_mps, turned(CROWD_MPS, angle), atol=0.25)
-
-
-@pytest.mark.parametrize('rate_hz', [3, 5, 10, 30])
-@pytest.mark.parametrize('people', [1, 2])
-@pytest.mark.parametrize('jump_m', [(0.3, 0), (0, -0.3), (0.4, 0.5)])
-def test_a_jump_of_the_pose_gives_standing_people_no_velocity(jump_m, people, rate_hz):
-    """The robot drives; the people are too few to show the jump by themselves."""
-    random, tracker = np.random.RandomState(2), Tracker()
-
-    def offset_m(time_s):
-        return np.multiply(jump_m, time_s >= 2)
-    published = play(tracker, 4, lambda time_s: noisy(random, CROWD[:people] + offset_m(time_s)), rate_hz,
-                     view=lambda time_s: view_from(*offset_m(time_s) + (0.3 * time_s, 0)))
-    for tracks in published[3 * rate_hz:]:
-        assert ids(tracks) == [1, 2][:people]
-        assert max(np.linalg.norm(track.velocity_mps) for track in tracks) < 0.2
-    assert tracker.totals.common_motions == 1
-
-
-def test_a_person_who_steps_aside_does_not_move_the_frame():
-    """The robot starts with 2 m/s2; the person steps by 0.5 m."""
-    tracker = Tracker()
-
-    def driven_m(time_s):
-        return max(time_s - 2, 0) ** 2
-    play(tracker, 4, lambda time_s: [at(3 + driven_m(time_s), 0.5 * (time_s >= 2))], 5,
-         view=lambda time_s: view_from(driven_m(time_s), 0))
-    assert not tracker.totals.common_motions
-
-
 def test_the_prediction_of_people_who_manoeuvre_is_less_certain():
     """The ellipse after 2 s is larger while a person stops or turns than while the same person walks on."""
     def area_m4(velocity_mps):
@@ -320,7 +262,7 @@ def test_the_prediction_of_people_who_manoeuvre_is_less_certain():
 
 @pytest.mark.parametrize('rate_hz', [5, 7.5])
 def test_the_velocities_of_people_who_turn_together_follow_the_turn(rate_hz):
-    """Three people side by side turn right within half a second, at 4 m/s2: the motion is not that of the frame."""
+    """Three people side by side turn right within half a second, at 4 m/s2."""
     def places(time_s):
         turned_s = min(max(time_s - 2, 0), 0.5)
         first = np.array([4.0 + 1.4 * (turned_s ** 2 + max(time_s - 2.5, 0)),
@@ -329,6 +271,6 @@ def test_the_velocities_of_people_who_turn_together_follow_the_turn(rate_hz):
     random, tracker = np.random.RandomState(0), Tracker()
     objects = play(tracker, 4.5, lambda time_s: noisy(random, places(time_s), 0.03), rate_hz,
                    view=VIEW._replace(intrinsics=None))[-1]
-    assert len(objects) == 3 and tracker.totals.common_motions <= 1
+    assert len(objects) == 3
     for track in objects:
         np.testing.assert_allclose(track.velocity_mps[:2], (1.4, 0), atol=0.4)

@@ -265,11 +265,10 @@ def steps_m(published):
 
 @pytest.mark.parametrize('rate_hz', [10, 30])
 @pytest.mark.parametrize('offset_m', [(0.1, 0), (0.2, 0), (0, 0.2), (0.3, 0), (0, -0.3)])
-def test_cameras_whose_poses_disagree_do_not_move_the_frame(rate_hz, offset_m):
+def test_cameras_whose_poses_disagree_keep_the_ids_of_people_in_both(rate_hz, offset_m):
     tracker = Tracker()
     published = play(tracker, images_of(4, lambda _time_s: [around(*person) for person in GROUP], rate_hz=rate_hz,
                                         offset_m=offset_m, sigma_m=0.01))[rate_hz:]
-    assert not tracker.totals.common_motions
     assert all(ids(objects) == [1, 2, 3, 4] for objects in published)
     assert max(steps_m(published)) < 0.4 * np.linalg.norm(offset_m)
 

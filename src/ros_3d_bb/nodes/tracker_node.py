@@ -89,9 +89,9 @@ class TrackerNode(object):
             depth_info_topic = info_topic_beside(rospy.resolve_name(depth_topic))
             subscribe_camera_info(depth_info_topic, depth_topic, of_camera(self._on_depth_camera_info), 1)
 
-    def _reconfigure(self, _params, marker_params, *tracking):
+    def _reconfigure(self, params, marker_params, *tracking):
         with self._stage.lock:
-            self._stage.reconfigure(tracking)
+            self._stage.reconfigure(params, tracking)
             self._markers.reconfigure(marker_params)
             self._markers.areas_m = self._stage.ignored_areas
 

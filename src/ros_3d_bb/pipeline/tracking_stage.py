@@ -20,6 +20,8 @@ from ros_3d_bb.core.params import CLASSES_FILE, DEPTH, DEPTH_SCALE, SET_BY_LAUNC
 from ros_3d_bb.core.time_sync import NS, CameraClocks, MessageCache
 from ros_3d_bb.estimation.error_model import error_model_of_param
 from ros_3d_bb.pipeline.depth_registration import DepthRegistration
+from ros_3d_bb.pipeline.tracking_frame import AUTO, TrackingFrame, transformed
+from ros_3d_bb.tracking.ignored_areas import IgnoredAreas, polygons_from
 from ros_3d_bb.tracking.measurement_model import NoiseParams
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.track import PredictionParams
@@ -30,6 +32,7 @@ TRACKING_PARAMS = TrackerParams, NoiseParams, PredictionParams
 AHEAD, BEHIND = 'images ahead of other cameras', 'images behind other cameras'  # counters
 CONTRADICTION = 'cameras that contradict each other'  # event, reported once
 NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/\w+)*$')
+PLACES = 'where no track starts'  # section of the parameters
 
 
 @parameters()
@@ -37,6 +40,10 @@ class TrackerNodeParams(NamedTuple):
     """Parameters of tracker_node, except those of the tracker and markers."""
 
     target_frame: str = Param('map')
+    tracking_frame: str = Param(
+        AUTO, 'Frame in which people are tracked. In target_frame, people seem to jump with each correction of the '
+        'localisation; in an odometry frame, they do not (REP 105). auto: the frame whose name begins with odom, such '
+        'as odom or robot1/odom, if tf has it between the camera and target_frame, else target_frame.')
     error_model: str = Param('')
     cameras: list = Param(())
     camera_frame: str = Param('')
@@ -51,11 +58,18 @@ class TrackerNodeParams(NamedTuple):
         1.0, 'With several cameras, no tracks are published while there are no boxes of one of them for this time, so '
         'that planners stop. Detectors must publish empty arrays, too (publish_empty). 0: the tracks of the other '
         'cameras are published, and planners drive on as if the silent one saw no people.', 's')
+    ignored_areas: str = Param(
+        '', 'Polygons of target_frame in which no track starts, as around mirrors and posters: a list of lists of '
+        'corners, such as [[[1, 2], [3, 2], [3, 4]]]; empty: none. Tracked people can walk through. Tracks in an area '
+        'end when it is set.', 'm', live=True, section=PLACES)
+    map_depth: float = Param(
+        0.3, 'With a map, no track starts in occupied cells and up to this distance behind them, as seen by the '
+        'camera.', 'm', limits=(0, 2), live=(0, 1), section=PLACES)
     use_map: bool = Param(False, 'Whether no track starts in occupied cells of the static map.', section=SET_BY_LAUNCH)
 
 
 class TrackingStage(object):
-    """Track 3D boxes in a fixed frame.
+    """Track 3D boxes in the frame of a `tracking_frame.TrackingFrame`, and convert the tracks to ~target_frame.
 
     If there is no transform at the stamp of the boxes, there is no result and tracks do not age. Each message is passed
     with the namespace of its camera, '' for a single one; boxes and depth images also with their arrival time `now_ns`
@@ -64,7 +78,7 @@ class TrackingStage(object):
 
     `tracking` has one instance of each of `TRACKING_PARAMS`. The method `lookup(target_frame, source_frame, stamp)` of
     `transforms` returns target_from_source (4, 4) or raises tf2_ros.TransformException. `on_tracks` is called with the
-    tracks (list of `types.TrackedObject`) after each image and their header, which has the newest stamp and the fixed
+    tracks (list of `types.TrackedObject`) after each image and their header, which has the newest stamp and the target
     frame; `lock` is held meanwhile. The IDs of tracks are greater than `last_id`.
 
     Attributes: `cameras`, the namespaces of the cameras; and `lock`.
@@ -73,7 +87,7 @@ class TrackingStage(object):
     def __init__(self, params, tracking, events, transforms, on_tracks, last_id=0):
         _check(params)
         params = params._replace(target_frame=params.target_frame.lstrip('/'))  # tf2 rejects frames with a slash
-        self._params, self._events, self._transforms, self._on_tracks = params, events, transforms, on_tracks
+        self._params, self._events, self._on_tracks = params, events, on_tracks
         self.cameras = tuple(params.cameras) or ('',)
         self._classes = read_object_classes(params.classes_file)
         model = error_model_of_param(params.error_model)
@@ -84,28 +98,53 @@ class TrackingStage(object):
         self._jumps = 0  # number of backward jumps in time
         self._boxes_ns = {}  # newest stamp of tracked boxes, by camera
         self._frames, self._intrinsics = {}, {}  # by camera
+        self._frame = TrackingFrame(transforms, params.tracking_frame, params.target_frame)
+        self._areas = _areas_of(params)
+        self._poses = {}  # latest CameraPose, by camera
+        self._newest_pose = None
         self._depths = {camera: MessageCache(int(params.depth_cache_length * NS)) for camera in self.cameras}
         self._registrations = {camera: DepthRegistration(transforms, topic_of(camera, DEPTH_TOPICS[RAW][1]))
                                for camera in self.cameras if params.depth == RAW}
 
-    def reconfigure(self, tracking):
-        """Use other tracking parameters for the next boxes; tracks are kept. Raises ValueError as the constructor."""
+    def reconfigure(self, params, tracking):
+        """Use other tracking parameters and ignored areas for the next boxes; tracks are kept, except those in other
+        areas than before. Raises ValueError as the constructor, without any change."""
+        areas = _areas_of(params)._replace(occupied=self._areas.occupied)
         with self.lock:
             self._tracker.reconfigure(*tracking)
+            if areas.differs_from(self._areas):
+                self._ignore(areas)
 
     @property
     def ignored_areas(self):
-        """Polygons, arrays (n, 2) in the fixed frame, in which no track starts."""
-        return self._tracker.ignored.polygons
+        """Polygons, arrays (n, 2) in the target frame, in which no track starts."""
+        return self._areas.polygons
 
     def set_map(self, message):
-        """Start no tracks in the occupied cells of a nav_msgs/OccupancyGrid. Raises ValueError if it is in another
-        frame than the tracks."""
+        """Start no tracks in the occupied cells of a nav_msgs/OccupancyGrid. With the first one, those there end.
+
+        Raises ValueError if it is in another frame than the published tracks.
+        """
         if message.header.frame_id.lstrip('/') != self._params.target_frame:
             raise ValueError('its frame is %r, and that of the tracks %r; the same expected, and no cells are ignored'
                              % (message.header.frame_id, self._params.target_frame))
+        areas = self._areas._replace(occupied=occupied_from_msg(message))
         with self.lock:
-            self._tracker.set_map(occupied_from_msg(message))
+            if self._areas.occupied is None:
+                self._ignore(areas)
+            self._areas = areas
+
+    def _ignore(self, areas):
+        """Use other IgnoredAreas. The tracks in them, which have started there, end."""
+        self._areas = areas
+        if self._newest_pose is None:
+            return
+        cameras_m = [pose.target_from_camera[:2, 3] for pose in self._poses.values()]
+
+        def is_ignored(place_m):
+            point_m, = self._newest_pose.in_target(np.array([place_m + (0.0,)]))
+            return any(areas.contains(point_m, camera_m) for camera_m in cameras_m)
+        self._tracker.delete_at(is_ignored)
 
     def add_camera_info(self, message, camera=''):
         """Add a sensor_msgs/CameraInfo. Raises ValueError if it is invalid."""
@@ -139,7 +178,7 @@ class TrackingStage(object):
                 return
             jumps = self._jumps
         try:  # not under the lock: waiting for the transform of one camera must not delay the others
-            fixed_from_camera = self._transforms.lookup(target_frame, frame_id, message.header.stamp)
+            pose = self._frame.pose(frame_id, message.header.stamp)
         except tf2_ros.TransformException as error:
             self._events.warn('no transform', 'no transform from %s to %s at %.3f: %s; tracks are kept as they are'
                               % (frame_id, target_frame, stamp_ns / NS, error))
@@ -149,13 +188,13 @@ class TrackingStage(object):
             return
         with self.lock:
             if jumps == self._jumps:
-                self._track(message, stamp_ns, fixed_from_camera, camera, camera_name)
+                self._track(message, stamp_ns, pose, camera, camera_name)
             else:
                 self._events.warn(BEHIND, 'boxes at %.3f are dropped: time jumped back while their transform was '
                                   'awaited' % (stamp_ns / NS))
 
-    def _track(self, message, stamp_ns, fixed_from_camera, camera, camera_name):
-        fault = viewing_fault(self._params.camera_frame or message.header.frame_id, fixed_from_camera)
+    def _track(self, message, stamp_ns, pose, camera, camera_name):
+        fault = viewing_fault(self._params.camera_frame or message.header.frame_id, pose.target_from_camera)
         if fault:
             self._tracker.skip(stamp_ns, camera_name)
             raise ValueError('%s; set ~frame_id (launch argument frame_id:=) to the optical frame, or correct its '
@@ -168,22 +207,14 @@ class TrackingStage(object):
             raise ValueError('none of their %d boxes is valid; tracks are kept as they are' % len(faults))
         if camera:
             self._check_frame(message.header.frame_id, camera)
-        before = self._tracker.totals
-        detections = detections_from_boxes(boxes, fixed_from_camera, self._classes)
+        untracked_boxes = self._tracker.untracked_boxes
+        detections = self._without_ignored(detections_from_boxes(boxes, pose.tracking_from_camera, self._classes), pose)
         tracks = self._tracker.update(stamp_ns, detections,
-                                      self._view(message.header, fixed_from_camera, camera, camera_name))
-        areas = self._tracker.ignored
-        if areas.polygons or areas.occupied is not None:
-            ignored = sum(areas.contains(detection.position_m, fixed_from_camera[:2, 3]) for detection in detections)
-            self._events.count('boxes in ignored areas', ignored)
+                                      self._view(message.header, pose.tracking_from_camera, camera, camera_name))
         self._events.count('images tracked')
-        totals = self._tracker.totals
-        if totals.untracked_boxes > before.untracked_boxes:
-            self._events.count('3D boxes that became no track', totals.untracked_boxes - before.untracked_boxes)
-        if totals.common_motions > before.common_motions:
-            self._events.warn('common motion compensated', 'the people at %.3f jumped together: the pose of the camera '
-                              'in %s jumped, as after an error of the odometry; all tracks are moved with them'
-                              % (stamp_ns / NS, self._params.target_frame))
+        untracked_boxes = self._tracker.untracked_boxes - untracked_boxes
+        if untracked_boxes > 0:
+            self._events.count('3D boxes that became no track', untracked_boxes)
         if len(self.cameras) > 1 and CONTRADICTION not in self._events.counts:
             contradicting = self._tracker.contradicting_cameras
             if contradicting:
@@ -191,14 +222,29 @@ class TrackingStage(object):
                                   'showed one person in two places: check the poses of these cameras in tf'
                                   % contradicting)
         newest_ns = self._clocks.track(stamp_ns, camera)
-        self._boxes_ns[camera] = stamp_ns
+        self._boxes_ns[camera], self._poses[camera] = stamp_ns, pose
+        if stamp_ns == newest_ns:
+            self._newest_pose = pose
         silent = self._silent_cameras(newest_ns)
         if silent:
             self._events.warn('tracks withheld', 'no boxes of %s were tracked within the last %g s (~camera_timeout): '
                               'no tracks are published, so that planners stop'
                               % (', '.join(silent), self._params.camera_timeout))
             return
-        self._on_tracks(tracks, Header(stamp=time_from(newest_ns), frame_id=self._params.target_frame))
+        self._on_tracks(transformed(tracks, self._newest_pose.target_from_tracking),
+                        Header(stamp=time_from(newest_ns), frame_id=self._params.target_frame))
+
+    def _without_ignored(self, detections, pose):
+        """Detections in the tracking frame, marked if they start no track."""
+        areas = self._areas
+        if not detections or not areas.polygons and areas.occupied is None:
+            return detections
+        camera_m = pose.target_from_camera[:2, 3]
+        places_m = pose.in_target(np.array([detection.position_m for detection in detections]))
+        detections = [detection._replace(is_ignored=areas.contains(place_m, camera_m))
+                      for detection, place_m in zip(detections, places_m)]
+        self._events.count('boxes in ignored areas', sum(detection.is_ignored for detection in detections))
+        return detections
 
     def _silent_cameras(self, newest_ns):
         """Names of the cameras whose newest boxes are older than ~camera_timeout."""
@@ -206,9 +252,9 @@ class TrackingStage(object):
         return [camera for camera in self.cameras
                 if newest_ns - self._boxes_ns.get(camera, float('-inf')) > timeout_s * NS]
 
-    def _view(self, header, fixed_from_camera, camera, camera_name):
+    def _view(self, header, tracking_from_camera, camera, camera_name):
         """Return the CameraView of boxes with this header, with intrinsics and depth if they are known."""
-        view = CameraView(fixed_from_camera, self._intrinsics.get(camera), camera_name)
+        view = CameraView(tracking_from_camera, self._intrinsics.get(camera), camera_name)
         entry = self._depths[camera].matching(header.stamp.to_nsec(), int(self._params.stamp_tolerance * NS))
         if view.intrinsics is None or entry is None:
             return view
@@ -267,6 +313,10 @@ def _depths_from_beside(geometry, depth, points):
     share = depths_towards(geometry.depth_camera, depth, points_there) / points_there[:, 2]
     beside_m = geometry.color_from_depth[2, 3]
     return beside_m + share * (points[:, 2] - beside_m)
+
+
+def _areas_of(params):
+    return IgnoredAreas(polygons_from(params.ignored_areas), None, params.map_depth)
 
 
 def _check(params):

@@ -72,6 +72,10 @@ class TransformBuffer(tf2_ros.BufferCore):
         self._clear_after(stamp.to_sec() + CACHE_S)
         return transform_from_msg(self.lookup_transform_core(target, source, stamp))
 
+    def ancestors(self, frame):
+        """The frame and its ancestors, the root last."""
+        return path_to_root(self._parents, frame)
+
     def forget_later(self, target_frame, source_frame):
         """Forget what is later than the latest transforms of a frame between two others, if those were rejected."""
         between = self._between(target_frame.lstrip('/'), source_frame.lstrip('/'))

@@ -184,8 +184,9 @@ def _assigned(costs):
 
 
 def initiate(tracks, unmatched, image, period_s, params, rules, assign_id):
-    """Start tracks from the unmatched measurements of an image, except those with little support or a low score, and
-    duplicate detections of recently matched or new tracks of the same group of classes. Returns the new tracks.
+    """Start tracks from the unmatched measurements of an image, except those that are ignored, or have little support
+    or a low score, and duplicate detections of recently matched or new tracks of the same group of classes. Returns the
+    new tracks.
 
     `period_s` is the time since the previous image of the camera, None for its first one. `params` are
     `tracker.TrackerParams`, `rules` the `track.Rules`; assign_id(number) returns the ID of the track that the detection
@@ -199,7 +200,8 @@ def initiate(tracks, unmatched, image, period_s, params, rules, assign_id):
         log_odds = log_odds_of(detection.score, rules.even_log_odds)
         is_duplicate = any(math.hypot(other_x - x, other_y - y) < params.duplicate_distance and group == kind.group
                            for other_x, other_y, group in occupied)
-        if log_odds > MIN_TRACK_SCORE and detection.support >= STARTING_SUPPORT and not is_duplicate:
+        is_excluded = is_duplicate or detection.is_ignored
+        if log_odds > MIN_TRACK_SCORE and detection.support >= STARTING_SUPPORT and not is_excluded:
             occupied.append((x, y, kind.group))
             new.append(Track(assign_id(measurement.number), measurement, stamp_ns, camera,
                              params.initial_speed * kind.known.initial_speed, log_odds + arrival_log_odds))

@@ -32,9 +32,7 @@ RANGE_GAIN = 0.05  # of the filter that learns the range; chosen
 GAIN = 0.2  # change of the logarithm of the variance by a pair of innovations, relative to their correlation
 LARGEST = 3.0  # correlations are limited to this multiple of the expected squared innovation
 SETTLED_HITS = 3  # innovations of newer tracks show their unknown velocity
-# Of the variance, for a twentieth to twice the standard deviation; from 0.15 on while the pose of a camera changes,
-# because the corrections of a localisation last for some images.
-MIN_LOG_SCALE, MIN_MOVING_LOG_SCALE, MAX_LOG_SCALE = 2 * math.log(0.05), 2 * math.log(0.15), 2 * math.log(2)
+MIN_LOG_SCALE, MAX_LOG_SCALE = 2 * math.log(0.05), 2 * math.log(2)  # of the variance, for 0.05 to 2 times the deviation
 BOX_ERRORS = 'errors of boxes (their covariance comes from the error model of bbox3d_node)'
 
 
@@ -192,7 +190,7 @@ def scaled(measurement, scale):
     return Measurement(x, y, z, scale * xx, scale * xy, scale * yy, *others)
 
 
-def learned_log_scale(log_scale, matches, camera_moves):
+def learned_log_scale(log_scale, matches):
     """The logarithm of the scale of the assumed variance after an image.
 
     In the matches (Track, Measurement), the tracks are predicted to the image, and the measurements have the noise for
@@ -207,8 +205,7 @@ def learned_log_scale(log_scale, matches, camera_moves):
             product = before_x * (measurement.x - state.x) + before_y * (measurement.y - state.y)
             expected = state.xx + state.yy + scale * (measurement.xx + measurement.yy)
             total += min(max(product / expected, -LARGEST), LARGEST)
-    least = MIN_MOVING_LOG_SCALE if camera_moves else MIN_LOG_SCALE
-    return min(max(log_scale - GAIN * total, least), MAX_LOG_SCALE)
+    return min(max(log_scale - GAIN * total, MIN_LOG_SCALE), MAX_LOG_SCALE)
 
 
 def learned_range(range_m, matches):

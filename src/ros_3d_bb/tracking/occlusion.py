@@ -6,7 +6,7 @@ detect it. A camera that stops sending images is ignored after a short time.
 """
 import itertools
 import math
-from typing import NamedTuple, Optional, Tuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,14 +43,11 @@ CONTRADICTING_M, CONTRADICTING_NS = 1.5, 5 * NS
 
 
 class CameraState(NamedTuple):
-    """The latest image of a camera, the range in which people are expected to be detected, whether most people fit
-    their tracks (`common_motion`), None if unknown, and the velocity (x, y, angle) of the camera, m/s and rad/s."""
+    """The latest image of a camera, and the range in which people are expected to be detected."""
 
     stamp_ns: int
     view: CameraView
     range_m: float
-    fits: Optional[bool]
-    velocity: Tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 def recent_others(cameras, camera, stamp_ns):

@@ -2,8 +2,7 @@
 
 Each person is tracked by a constant-velocity Kalman filter in the plane (`kalman_filter`). Detections are assigned to
 tracks by maximum total likelihood (`association`). A detection that a new target explains better starts a track
-(`initiate`) that is published once it is likely to be a person (`track`). If most people seem to jump in the same way,
-the pose of the camera jumped, and all tracks are moved (`common_motion`). Undetected people are not dropped
+(`initiate`) that is published once it is likely to be a person (`track`). Undetected people are not dropped
 immediately: their tracks stay published for a short time if a camera should detect them, and for longer if a person or
 an object occludes them (`occlusion`). Unpublished tracks are kept for longer still, so that people who reappear keep
 their track ID.
@@ -17,26 +16,21 @@ from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.association import NEW_NS, associate, duplicates, initiate
-from ros_3d_bb.tracking.common_motion import (FEWEST, SETTLED_NS, camera_motion, common_motion, may_jump, most_fit,
-                                              moved, pose_jump)
-from ros_3d_bb.tracking.ignored_areas import IgnoredAreas, polygons_from
 from ros_3d_bb.tracking.manoeuvres import match_manoeuvres
 from ros_3d_bb.tracking.measurement_model import (BOX_ERRORS, DEFAULT_RANGE_M, BoxNoise, Kinds, NoiseParams,
                                                   correlated_images, learned_log_scale, learned_range,
                                                   measurements_of, scaled)
-from ros_3d_bb.tracking.occlusion import CameraState, contradicting_cameras, mark_missed, recent_others
+from ros_3d_bb.tracking.occlusion import CameraState, contradicting_cameras, mark_missed
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, OutOfSequenceBuffer
-from ros_3d_bb.tracking.track import (MIN_TRACK_SCORE, NEVER_NS, SEEN, PredictionParams, Rules, Track,
-                                      learned_prediction, published)
-from ros_3d_bb.tracking.types import VISIBLE, Totals, check_steps
+from ros_3d_bb.tracking.track import (MIN_TRACK_SCORE, PredictionParams, Rules, Track, learned_prediction,
+                                      published)
+from ros_3d_bb.tracking.types import VISIBLE, check_steps
 
 KNOWN_NS = 60 * NS  # a camera without images for longer than this, while others send images, counts as new; chosen
-MOVED, MOVING_NS = 0.001, 10 * NS  # change of the pose of a camera that moves, m and rad, and duration; chosen
 MAX_POSITION_STD_M = 2.4  # tracks whose position is less certain are dropped; chosen
 TENTATIVE_TIMEOUT_S = 0.75  # how long a tentative track is kept without a detection; chosen
 BY_ID, FIRST_SEEN = operator.attrgetter('id'), operator.attrgetter('first_ns')
 # Sections of the parameters.
-PLACES = 'where no track starts'
 MOTION, ASSOCIATION = 'how people move', 'association of boxes with tracks'
 
 
@@ -79,28 +73,18 @@ class TrackerParams(NamedTuple):
         'occluder. With 0, every missed person gets a new ID.', 's', live=(0, 30))
     moving_speed: float = Param(
         0.2, 'A person counts as moving from this speed on, and then down to half of it.', 'm/s', live=(0, 1))
-    ignored_areas: str = Param(
-        '', 'Polygons of the fixed frame in which no track starts, as around mirrors and posters: a list of lists of '
-        'corners, such as [[[1, 2], [3, 2], [3, 4]]]; empty: none. Tracked people can walk through. Tracks in an area '
-        'end when it is set.', 'm', live=True, section=PLACES)
-    map_depth: float = Param(
-        0.3, 'With a map, no track starts in occupied cells and up to this distance behind them, as seen by the '
-        'camera.', 'm', limits=(0, 2), live=(0, 1), section=PLACES)
 
 
 class _State(NamedTuple):
     """State of the tracker after an image: the tracks, the stamp of the latest image, the `CameraState` of each camera,
-    the stamps of the latest image that most people did not fit (None without) and of that for which a camera moved, the
-    learned `measurement_model.learned_log_scale`, and the Totals.
+    the learned `measurement_model.learned_log_scale`, and the number of boxes whose tracks ended unpublished.
     """
 
     tracks: Sequence[Track]
     now_ns: Optional[int]
     cameras: dict
-    misfit_ns: Optional[int]
-    moved_ns: int
     log_noise_scale: float
-    totals: Totals
+    untracked_boxes: int
 
 
 class Tracker(object):
@@ -118,38 +102,25 @@ class Tracker(object):
 
     def __init__(self, params=TrackerParams(), noise=NoiseParams(), prediction=PredictionParams(), last_id=0,
                  classes=ObjectClasses(), detector=DetectorModel()):
-        self._kinds, self._detector, self.ignored = Kinds(classes), detector, IgnoredAreas()
+        self._kinds, self._detector = Kinds(classes), detector
         self._start(last_id)
         self.reconfigure(params, noise, prediction)
 
     def _start(self, last_id, log_noise_scale=0.0):
-        state = _State([], None, {}, None, NEVER_NS, log_noise_scale, Totals())
+        state = _State([], None, {}, log_noise_scale, 0)
         self._buffer = OutOfSequenceBuffer(self._step, state, last_id)
 
     def reconfigure(self, params, noise, prediction):
         """Change the parameters and keep the tracks. Raises ValueError without any change if one is invalid."""
-        areas = self.ignored._replace(polygons=polygons_from(params.ignored_areas), map_depth_m=params.map_depth)
         check_steps(prediction.prediction_time, prediction.prediction_step)
         self._params = params, noise, prediction
         self._rules = Rules.of(params, self._kinds)
-        if areas.differs_from(self.ignored):
-            self._ignore(areas)
 
-    def set_map(self, occupied):
-        """Start no tracks in the cells of a static map, `ignored_areas.OccupiedCells`. With the first map, those there
-        end."""
-        areas = self.ignored._replace(occupied=occupied)
-        if self.ignored.occupied is None:
-            self._ignore(areas)
-        self.ignored = areas
-
-    def _ignore(self, areas):
-        """Use other IgnoredAreas. The tracks in them, which have started there, end."""
+    def delete_at(self, is_ignored):
+        """Delete the tracks for whose position (x, y) `is_ignored` returns True."""
         self._buffer.replay()
-        self.ignored, state = areas, self._buffer.state
-        cameras_m = [camera.view.fixed_from_camera[:2, 3] for camera in state.cameras.values()]
-        tracks = [track for track in state.tracks if not any(
-            areas.contains((track.state.x, track.state.y), camera_m) for camera_m in cameras_m)]
+        state = self._buffer.state
+        tracks = [track for track in state.tracks if not is_ignored((track.state.x, track.state.y))]
         self._buffer = OutOfSequenceBuffer(self._step, state._replace(tracks=tracks), self._buffer.last_id)
 
     def reset(self):
@@ -171,9 +142,9 @@ class Tracker(object):
         return self._published()
 
     @property
-    def totals(self):
-        """The Totals until the newest image."""
-        return self._buffer.state.totals
+    def untracked_boxes(self):
+        """Number of boxes whose tracks ended unpublished, until the newest image, since the last reset."""
+        return self._buffer.state.untracked_boxes
 
     @property
     def contradicting_cameras(self):
@@ -194,18 +165,18 @@ class Tracker(object):
 
     def _step(self, before, image, observed_s, assign_id):
         """One cycle of the tracker: see `step` of OutOfSequenceBuffer."""
-        camera = camera_motion(before.cameras.get(image.view.camera), image)
+        latest = before.cameras.get(image.view.camera)
+        period_s = (image.stamp_ns - latest.stamp_ns) / NS if latest else None
         tracks = self._predict(before, image.stamp_ns)
-        measurements = self._measure(before, image, camera.period_s)
-        matches, fits, is_moved = self._associate(before, tracks, measurements, image, camera)
-        if len(matches) < len(measurements) and not is_moved and camera.previous:
-            matches += match_manoeuvres(tracks, measurements, matches, camera.previous.stamp_ns, image.stamp_ns,
+        measurements = self._measure(before, image, period_s)
+        matches = associate(tracks, measurements, image.stamp_ns, self._params[0], self._rules.outliers)
+        if len(matches) < len(measurements) and latest:
+            matches += match_manoeuvres(tracks, measurements, matches, latest.stamp_ns, image.stamp_ns,
                                         self._params[0].height_sigma)
         matched = {track.id: (track.is_confirmed, measurement.number) for track, measurement in matches}
-        moved_ns = image.stamp_ns if any(abs(part) > MOVED for part in camera.change) else before.moved_ns
-        log_noise_scale = learned_log_scale(before.log_noise_scale, matches, image.stamp_ns - moved_ns < MOVING_NS)
+        log_noise_scale = learned_log_scale(before.log_noise_scale, matches)
         self._update_matched(matches, log_noise_scale - max(before.log_noise_scale, 0), image)
-        cameras = self._cameras_after(before, image, camera, matches, fits)
+        cameras = self._cameras_after(before, image, matches)
         missed = [track for track in tracks if track.id not in matched]
         if missed:
             mark_missed(missed, tracks, before.tracks, cameras, image.view.camera, observed_s,
@@ -213,14 +184,9 @@ class Tracker(object):
         tracks, untracked_boxes = self._delete(tracks, image.stamp_ns)
         if len(matches) < len(measurements):
             taken = set(number for _is_confirmed, number in matched.values())
-            camera_m = image.view.fixed_from_camera[:2, 3]
-            unmatched = [measurement for measurement in measurements if measurement.number not in taken
-                         and not self.ignored.contains((measurement.x, measurement.y), camera_m)]
-            period_s = camera.period_s if camera.previous else None
+            unmatched = [measurement for measurement in measurements if measurement.number not in taken]
             tracks += initiate(tracks, unmatched, image, period_s, self._params[0], self._rules, assign_id)
-        misfit_ns = image.stamp_ns if fits is False else before.misfit_ns
-        totals = Totals(before.totals.common_motions + is_moved, before.totals.untracked_boxes + untracked_boxes)
-        state = _State(tracks, image.stamp_ns, cameras, misfit_ns, moved_ns, log_noise_scale, totals)
+        state = _State(tracks, image.stamp_ns, cameras, log_noise_scale, before.untracked_boxes + untracked_boxes)
         return state, [(track_id,) + match for track_id, match in matched.items()]
 
     def _predict(self, before, stamp_ns):
@@ -238,53 +204,19 @@ class Tracker(object):
                          images)
         return measurements_of(image.detections, image.view, noise, self._kinds)
 
-    def _associate(self, before, tracks, measurements, image, camera):
-        """Assign measurements to tracks; if the pose of the camera jumped, the tracks are moved before.
-
-        Returns the matches [(Track, Measurement)], whether most people fit without a motion (None if unknown), and
-        whether there was one.
-        """
-        stamp_ns, params, outliers = image.stamp_ns, self._params[0], self._rules.outliers
-        known = [track for track in tracks if camera.previous and track.is_confirmed
-                 and track.visibility.get(image.view.camera) == SEEN]
-        motion = pose_jump(camera, known, measurements, image.view)
-        if motion is not None:
-            return self._associate_moved(tracks, measurements, image, motion), None, True
-        matches = associate(tracks, measurements, stamp_ns, params, outliers)
-        if min(len(tracks), len(measurements)) < FEWEST:
-            return matches, None, False
-        fits = most_fit(known, matches, len(measurements))
-        is_settled = before.misfit_ns is None or stamp_ns - before.misfit_ns > SETTLED_NS
-        if fits is not False or not is_settled or not may_jump(
-                camera.previous, recent_others(before.cameras, image.view.camera, stamp_ns).values()):
-            return matches, fits, False
-        motion = common_motion(known, measurements, image.view, camera.period_s)
-        if motion is None:
-            return matches, fits, False
-        return self._associate_moved(tracks, measurements, image, motion), fits, True
-
-    def _associate_moved(self, tracks, measurements, image, motion):
-        """Move all tracks by a motion of the frame, in place, and assign the measurements."""
-        for track in tracks:
-            track.state = moved(track.state, *motion, view=image.view)
-        return associate(tracks, measurements, image.stamp_ns, self._params[0], self._rules.outliers)
-
     def _update_matched(self, matches, log_factor, image):
         """Update the tracks of the matches, with the variance of assumed noise multiplied by exp(`log_factor`)."""
         scale = math.exp(log_factor)
         for track, measurement in matches:
             track.update(scaled(measurement, scale), image.stamp_ns, image.view.camera, self._rules)
 
-    def _cameras_after(self, before, image, camera, matches, fits):
+    def _cameras_after(self, before, image, matches):
         """The CameraState of each camera after an image with matches."""
-        latest = camera.previous
-        range_m = self._detector.max_range_m
+        latest, range_m = before.cameras.get(image.view.camera), self._detector.max_range_m
         if range_m is None:
             range_m = learned_range(latest.range_m if latest else DEFAULT_RANGE_M, matches)
-        if fits is None and latest:
-            fits = latest.fits
         cameras = {name: known for name, known in before.cameras.items() if image.stamp_ns - known.stamp_ns <= KNOWN_NS}
-        cameras[image.view.camera] = CameraState(image.stamp_ns, image.view, range_m, fits, camera.velocity)
+        cameras[image.view.camera] = CameraState(image.stamp_ns, image.view, range_m)
         return cameras
 
     def _delete(self, tracks, stamp_ns):

@@ -22,7 +22,8 @@ class Detection(NamedTuple):
     `covariance_m2` (3, 3) is the covariance of the centre, None if unknown. `truncated_edges` states whether the image
     border truncates the object at the left, top, right and bottom, as seen by a camera held upright. `support` is the
     share 0..1 of the depth in its 2D box that belongs to the object. `label` is the class name, `score` that of the
-    detector, 0..1, 0 if unknown, and `index` the index of the object's box among those of the image.
+    detector, 0..1, 0 if unknown, and `index` the index of the object's box among those of the image. A detection that
+    `is_ignored` starts no track.
     """
 
     position_m: Sequence[float]
@@ -33,6 +34,7 @@ class Detection(NamedTuple):
     label: str = PERSON
     score: float = 0.0
     index: int = NOT_DETECTED
+    is_ignored: bool = False
 
 
 def detections_from_boxes(boxes, fixed_from_camera, classes=ObjectClasses()):
@@ -145,15 +147,6 @@ class TrackedObject(NamedTuple):
     label: str = PERSON
     score: float = 0.0
     detection: int = NOT_DETECTED
-
-
-class Totals(NamedTuple):
-    """Number of images in which the pose of the camera jumped (`common_motion`), and of boxes whose tracks ended
-    unpublished, since the last reset.
-    """
-
-    common_motions: int = 0
-    untracked_boxes: int = 0
 
 
 def wrapped(angles):

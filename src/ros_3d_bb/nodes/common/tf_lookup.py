@@ -87,6 +87,10 @@ class Transforms(object):
                 self._listener.news.wait(min(left_s, LONGEST_WAIT_S))
         raise type(fault)(self._explanation(frames, stamp) or str(fault))
 
+    def ancestors(self, frame):
+        """As of the TransformBuffer."""
+        return self.buffer.ancestors(frame)
+
     def latest(self, target_frame, source_frame):
         """Look up the latest transform, which is that received last after a jump in time, too. Returns it, as `lookup`,
         and its age in seconds, 0 if only static transforms are between the frames."""
