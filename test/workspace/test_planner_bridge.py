@@ -124,6 +124,16 @@ def test_an_output_waits_for_the_transform_of_its_own_frame_only():
         assert bridge.counts['no transform'] == 3
 
 
+def test_an_output_that_raises_is_counted_and_the_others_are_published():
+    with bridge_with('costmap, mpc', planner_frame='map') as bridge:
+        broken, = [topic for topic in bridge.node._topics if topic.output.topic == MPC]
+        broken.output = broken.output._replace(write=lambda tracks, *_given: tracks[0].no_such_field)
+        bridge.send_tf(START_NS, 'base_link', (3, 0, 0))
+        bridge.send(START_NS, person(1, 2, 0))
+        assert bridge.count(POINTS) == 1 and bridge.count(MPC) == 0
+        assert bridge.counts['outputs failed'] == 1 and bridge.counts['tracks forwarded'] == 1
+
+
 def test_without_transform_each_output_is_emptied_once():
     """The ring stays away, which costmap_2d notices (expected_update_rate)."""
     with bridge_with('costmap, people') as bridge:

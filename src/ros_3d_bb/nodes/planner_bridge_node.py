@@ -70,8 +70,8 @@ class ReceivedTracks(NamedTuple):
 class PlannerTopic(object):
     """An output topic. `held` are the ReceivedTracks that the planner holds, None if it holds none."""
 
-    def __init__(self, output):
-        self.output, self.held = output, None
+    def __init__(self, output, diagnostics):
+        self.output, self.held, self._diagnostics = output, None, diagnostics
         self._publisher = rospy.Publisher(output.topic, output.kind, queue_size=2)
 
     def send(self, tracks, stamp_ns, received):
@@ -83,7 +83,13 @@ class PlannerTopic(object):
         output = self.output
         frame_id = (output.frame or received.frame_id).lstrip('/')  # tf2 rejects frames with a slash
         header = Header(stamp=time_from(0 if output.latest_tf else stamp_ns), frame_id=frame_id)
-        self._publisher.publish(output.write(tracks, received.transforms[output.frame, output.latest_tf], header))
+        try:
+            message = output.write(tracks, received.transforms[output.frame, output.latest_tf], header)
+        except Exception as error:  # a fault of one output must not keep the tracks from the others
+            self._diagnostics.warn('outputs failed', '%s cannot be written (%r); the others are published, and it '
+                                   'is tried again with the next tracks' % (output.topic, error))
+            return
+        self._publisher.publish(message)
 
     def empty(self, stamp_ns):
         """Publish an empty array in the frame of the last one, if planners need it."""
@@ -131,10 +137,10 @@ class PlannerBridgeNode(object):
         if not self._params.robot_frame:
             raise ValueError('parameter ~robot_frame is empty; a frame such as base_link expected')
         self._classes = read_object_classes(self._params.classes_file)
-        self._topics = [PlannerTopic(output) for output in outputs_from(self._params)]
+        self._diagnostics = Diagnostics()
+        self._topics = [PlannerTopic(output, self._diagnostics) for output in outputs_from(self._params)]
         self._lock = threading.Lock()
         self._received = None
-        self._diagnostics = Diagnostics()
         self._transforms = Transforms(self._params.tf_timeout)
         self._diagnostics.show('tf age', self._transforms.age)
         rospy.on_shutdown(self._empty_all)
