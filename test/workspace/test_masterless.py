@@ -7,7 +7,9 @@ from std_msgs.msg import Header
 from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.images import DepthImage, mounted_camera
+from ros_3d_bb.conversions import image_msgs
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, TF_TOPIC, CameraFrame, messages_of
+from ros_3d_bb.conversions.compressed_images import decode
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg
 from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.nodes import people_node, tracker_node
@@ -26,12 +28,13 @@ SCENE = {'duration': 1.5, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves'
 
 
 CODECS = {'plain': {}, 'compressed': {COLOR_TOPIC: 'jpeg', DEPTH_TOPIC: 'compressedDepth rvl'}}
+NAMES = {COLOR_TOPIC: COLOR_TOPIC + '/compressed', DEPTH_TOPIC: DEPTH_TOPIC + '/compressedDepth'}
 
 
 @pytest.fixture(scope='module', params=sorted(CODECS))
 def bags(request, tmp_path_factory):
     folder, codecs = tmp_path_factory.mktemp('bags'), CODECS[request.param]
-    names = {topic: '%s/%s' % (topic, 'compressedDepth' if topic == DEPTH_TOPIC else 'compressed') for topic in codecs}
+    names = NAMES if codecs else {}
 
     def with_codec(topic, message, time):
         codec, name = codecs.get(topic[1:]), names.get(topic[1:], topic[1:])
@@ -51,6 +54,18 @@ def test_process_bag_writes_the_messages_that_the_nodes_publish(bags, node_class
         expected = messages_in(bags[1], '/' + topic)['/' + topic]
         assert len(expected) == 15
         assert [str(message) for message in found[topic]] == [str(message) for message in expected]
+
+
+@pytest.mark.parametrize('bags', ['compressed'], indirect=True)
+def test_people_node_and_process_bag_decode_each_image_once(bags, tmp_path, monkeypatch):
+    decoded = []
+    monkeypatch.setattr(image_msgs, 'decode', lambda text, data: decoded.append(text) or decode(text, data))
+    published(PeopleNode, bags[0], {'detector': 'depth'}, [TRACKS_TOPIC])
+    of_node = sorted(decoded)
+    del decoded[:]
+    process_bag(bags[0], str(tmp_path / 'out.bag'), Settings(detector='depth', names=NAMES))
+    assert of_node == sorted(decoded) and len(decoded) == 30
+    assert sum('compressedDepth' in text for text in decoded) == 15
 
 
 def test_the_other_parts_of_people_node_do_not_wait_for_late_transforms(monkeypatch):

@@ -7,8 +7,7 @@ from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault
 from ros_3d_bb.conversions.camera_msgs import (COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS, RAW, info_of_images,
                                                info_topic_beside, uncompressed)
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_rgb
-from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, boxes3d_to_msg, camera_from_msg,
-                                                   header_of, stamp_of)
+from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, camera_from_msg, stamp_of
 from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.core.object_classes import described
 from ros_3d_bb.core.time_sync import NS, MessageCache
@@ -41,17 +40,19 @@ class Bbox3dNode(object):
     """
 
     def __init__(self, part=Part()):
-        params, = read_params(Bbox3dParams, namespace=part.namespace)
+        self.params, = params, = read_params(Bbox3dParams, namespace=part.namespace)
         self._diagnostics = Diagnostics(part)
         self._next_stage = part.next_stage
         self._stage = EstimationStage(params, self._diagnostics)
         self._boxes_pub = rospy.Publisher(BOXES3D_TOPIC, BoundingBox3DArray, queue_size=10)
         self._images = SampleImages(params, self._stage, self._diagnostics)
-        self._inputs = RgbdInputs(params, self._diagnostics, self._on_match, part.transforms,
-                                  cache_s=params.cache_length, assumed_delay_s=params.assumed_delay)
+        self._inputs = part.inputs or RgbdInputs(params, self._diagnostics, part.transforms,
+                                                 cache_s=params.cache_length, assumed_delay_s=params.assumed_delay)
+        self._inputs.pipeline.connect_estimator(self._stage, self._diagnostics, self._publish)
         if params.depth != RAW:
             self._diagnostics.check(DepthCameraCheck(with_frames=not params.frame_id).faults)
-        self.on_boxes = self._inputs.receiver('2D boxes', self._inputs.source.add_boxes)
+        self._source = self._inputs.pipeline.source
+        self.on_boxes = self._inputs.receiver('2D boxes', self._source.add_boxes)
         if part.subscribes:
             subscribe(BOXES_TOPIC, Int32MultiArray, self.on_boxes)
         ReconfigureServer([params], self._reconfigure, part.namespace)
@@ -59,21 +60,15 @@ class Bbox3dNode(object):
     def _reconfigure(self, params):
         with self._inputs.lock:
             self._stage.reconfigure(params)
-            self._inputs.source.set_assumed_delay(params.assumed_delay)
+            self._source.set_assumed_delay(params.assumed_delay)
             self._images.depth_range_m = params.depth_image_range
 
-    def _on_match(self, boxes2d, depth_msg, camera):
-        """Publish the 3D boxes of one image, once its 2D boxes, depth image and camera model have arrived."""
-        with self._diagnostics.rejecting('2D boxes'):
-            frame = self._inputs.source.frame(boxes2d, depth_msg, camera)
-            boxes3d = self._stage.estimate(frame, boxes2d)
-            received = frame.received
-            message = boxes3d_to_msg(boxes3d, header_of(received), received.camera)
-            self._boxes_pub.publish(message)
-            self._diagnostics.record_latency(message.header.stamp)
-            if self._next_stage is not None:
-                self._next_stage(message)
-            self._images.publish(message.header, received.depth, boxes3d)
+    def _publish(self, message, boxes3d, frame, depth_msg):
+        self._boxes_pub.publish(message)
+        self._diagnostics.record_latency(message.header.stamp)
+        if self._next_stage is not None:
+            self._next_stage(message, depth_msg)
+        self._images.publish(message.header, frame.received.depth, boxes3d)
 
 
 class DepthCameraCheck(object):

@@ -30,9 +30,12 @@ class DepthDetectorNode(object):
         self._diagnostics = Diagnostics(part)
         self._detecting = threading.Lock()
         self._stage = DepthDetectionStage(params, people, self._diagnostics)
-        self._worker = DetectorWorker(params, self._diagnostics, self._detect, self._stage.names, part)
-        self._inputs = RgbdInputs(params, self._diagnostics, self._worker.offer, part.transforms)
-        subscribe(COLOR_TOPIC, Image, self._inputs.receiver('colour images', self._inputs.source.add_color))
+        self.params, self.inputs = params, RgbdInputs(params, self._diagnostics, part.transforms)
+        self._pipeline = self.inputs.pipeline
+        worker = DetectorWorker(params, self._diagnostics, self._detect, self._stage.names,
+                                part._replace(next_stage=self._pipeline.estimate))
+        self._pipeline.connect_detector(self._stage, worker.offer)
+        subscribe(COLOR_TOPIC, Image, self.inputs.receiver('colour images', self._pipeline.source.add_color))
         ReconfigureServer([params, people], self._reconfigure, part.namespace)
 
     def _reconfigure(self, params, people):
@@ -41,6 +44,4 @@ class DepthDetectorNode(object):
 
     def _detect(self, *messages):
         with self._detecting:
-            frame = self._inputs.source.frame(*messages)
-            detections = self._stage.detect(frame)
-        return None if detections is None else (frame.received.color, detections)
+            return self._pipeline.detect(*messages)

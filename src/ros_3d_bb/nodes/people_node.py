@@ -11,8 +11,7 @@ from ros_3d_bb.nodes.common.subscribers import AT_ONCE
 from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.nodes.yolov5_node import Yolov5Node
-
-DETECTORS = {'yolov5': ('yolov5_node/', Yolov5Node), 'depth': ('depth_detector_node/', DepthDetectorNode)}
+from ros_3d_bb.pipeline.people_pipeline import check_equal
 
 
 @parameters()
@@ -35,10 +34,16 @@ class PeopleNode(object):
         params, = read_params(PeopleNodeParams)
         tracker = TrackerNode(Part('tracker_node/', subscribes=False))
         # In a thread of its own, as the detector must not wait for the transforms of the tracker.
-        worker = NewestWorker(tracker.on_boxes, lambda error: rospy.logerr('tracking failed: %s', error), AT_ONCE)
+        worker = NewestWorker(lambda boxes: tracker.on_frame(*boxes),
+                              lambda error: rospy.logerr('tracking failed: %s', error), AT_ONCE)
         rospy.on_shutdown(worker.stop)
-        bbox3d = Bbox3dNode(Part('bbox3d_node/', tracker.transforms, worker.offer, monitors=False,
-                                 subscribes=params.detector not in DETECTORS))
-        if params.detector in DETECTORS:
-            namespace, node = DETECTORS[params.detector]
-            node(Part(namespace, tracker.transforms, bbox3d.on_boxes, monitors=False))
+        detector = inputs = None
+        if params.detector == 'depth':
+            detector = DepthDetectorNode(Part('depth_detector_node/', tracker.transforms, monitors=False))
+            inputs = detector.inputs
+        bbox3d = Bbox3dNode(Part('bbox3d_node/', tracker.transforms, inputs, lambda *boxes: worker.offer(boxes),
+                                 subscribes=params.detector == 'none', monitors=False))
+        if params.detector == 'depth':
+            check_equal(detector.params, bbox3d.params)
+        elif params.detector == 'yolov5':
+            Yolov5Node(Part('yolov5_node/', tracker.transforms, next_stage=bbox3d.on_boxes, monitors=False))

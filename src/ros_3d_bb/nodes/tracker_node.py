@@ -69,6 +69,7 @@ class TrackerNode(object):
         self._markers_pub = rospy.Publisher(MARKERS_TOPIC, MarkerArray, queue_size=10)
         for camera in self._stage.cameras:
             self._subscribe(camera, params, part.subscribes)
+        self._uses_depth = params.use_depth
         if params.use_map:
             subscribe('map', OccupancyGrid, self._on_map, 1, is_irregular=True)
         self._markers.areas_m = self._stage.ignored_areas
@@ -80,10 +81,10 @@ class TrackerNode(object):
         def of_camera(callback):
             return functools.partial(callback, camera=camera)
         if with_boxes:
-            subscribe(topic_of(camera, BOXES3D_TOPIC), BoundingBox3DArray, of_camera(self.on_boxes))
+            subscribe(topic_of(camera, BOXES3D_TOPIC), BoundingBox3DArray, of_camera(self._on_boxes))
         subscribe_camera_info(topic_of(camera, INFO_TOPICS[0]), topic_of(camera, COLOR_INFO_IMAGES[params.depth]),
                               of_camera(self._on_camera_info), 1)
-        if params.use_depth:
+        if params.use_depth and with_boxes:
             subscribe(depth_topic, Image, of_camera(self._on_depth), KEPT_AT_ONCE)
         if params.use_depth and params.depth == RAW:
             depth_info_topic = info_topic_beside(rospy.resolve_name(depth_topic))
@@ -112,8 +113,13 @@ class TrackerNode(object):
         with self._diagnostics.receiving('depth images'):
             self._stage.add_depth(message, arrival_clock_ns(), camera)
 
-    def on_boxes(self, message, camera=''):
-        """Process the 3D boxes of an image."""
+    def on_frame(self, message, depth_msg):
+        """Process the 3D boxes and the depth image of a frame."""
+        if self._uses_depth:
+            self._on_depth(depth_msg, '')
+        self._on_boxes(message)
+
+    def _on_boxes(self, message, camera=''):
         with self._diagnostics.receiving('3D boxes'):
             self._stage.add_boxes(message, arrival_clock_ns(), camera)
 

@@ -9,13 +9,14 @@ from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.conversions.camera_msgs import (COLOR_INFO_IMAGES, COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, IMAGE_KINDS,
                                                INFO_TOPICS, RAW, STATIC_TOPIC, TF_TOPIC, absolute, info_of_images,
-                                               topic_of, uncompressed)
-from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, Boxes2D, boxes2d_from_msg,
-                                                   boxes3d_to_msg, detections2d_to_msg, header_of, tracks_to_msg)
+                                               topic_of)
+from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, detections2d_to_msg,
+                                                   tracks_to_msg)
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams
+from ros_3d_bb.pipeline.camera_pipeline import CameraPipeline
 from ros_3d_bb.pipeline.detection_stage import DepthDetectionStage, DepthDetectorParams, Yolov5NodeParams
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
 from ros_3d_bb.pipeline.rgbd_source import RgbdSource
@@ -73,17 +74,23 @@ class Settings(NamedTuple):
     def source(self, camera, events, on_match, transforms):
         """Return the RgbdSource of a camera for detection and estimation. ValueError if their parameters differ."""
         params = self.bbox3d[0]
-        for name in DepthDetectorParams._fields if self.detector == 'depth' else ():
-            if getattr(params, name, None) != getattr(self.depth[0], name) and name in params._fields:
-                raise ValueError('parameter ~%s is %r for depth_detector_node and %r for bbox3d_node; equal values '
-                                 'expected, because both use the same images'
-                                 % (name, getattr(self.depth[0], name), getattr(params, name)))
+        if self.detector == 'depth':
+            check_equal(self.depth[0], params)
         topics = [self.name(topic, camera) for topic in (DEPTH_TOPIC, DEPTH_INFO_TOPIC, INFO_TOPIC)]
         return RgbdSource(params, events, on_match, transforms, topics, params.cache_length, params.assumed_delay)
 
 
+def check_equal(detector_params, bbox3d_params):
+    """Raise ValueError if parameters of depth_detector_node and bbox3d_node that both have differ."""
+    for name in set(detector_params._fields).intersection(bbox3d_params._fields):
+        values = getattr(detector_params, name), getattr(bbox3d_params, name)
+        if values[0] != values[1]:
+            raise ValueError('parameter ~%s is %r for depth_detector_node and %r for bbox3d_node; equal values '
+                             'expected, because both use the same images' % ((name,) + values))
+
+
 class PeoplePipeline(object):
-    """The three stages: detection and estimation of each camera, and tracking. Collects what the nodes would publish.
+    """The CameraPipeline of each camera, and tracking, on a bag. Collects what the nodes would publish.
 
     Networks detect without depth and are therefore outside: their detections are passed to `add_detections`.
     `transforms` is as for `tracking_stage.TrackingStage`. Raises ValueError if one of the Settings is invalid.
@@ -95,20 +102,21 @@ class PeoplePipeline(object):
         tracker_params, marker_params, *tracking = settings.tracker
         self._markers = MarkerWriter(marker_params)
         self._tracking_stage = TrackingStage(tracker_params, tracking, events, transforms, self._on_tracks)
-        self._sources, self._detection_stages, self._estimation_stages = {}, {}, {}  # by camera
+        self._cameras = {}
         for camera in settings.cameras:
-            on_match = functools.partial(self._on_match, camera)
-            self._sources[camera] = settings.source(camera, events, on_match, transforms)
-            self._estimation_stages[camera] = EstimationStage(settings.bbox3d[0], events)
+            pipeline = self._cameras[camera] = CameraPipeline()
+            pipeline.source = settings.source(camera, events, pipeline.on_match, transforms)
+            pipeline.connect_estimator(EstimationStage(settings.bbox3d[0], events), events,
+                                       functools.partial(self._on_boxes3d, camera))
             if settings.detector == 'depth':
-                self._detection_stages[camera] = DepthDetectionStage(*settings.depth, events)
+                pipeline.connect_detector(DepthDetectionStage(*settings.depth, events),
+                                          functools.partial(self._detect, camera))
         self._now_ns = 0  # time of the message that is being processed
 
     def take(self, topic, message, now_ns, camera=''):
         """Process a message on one of the `INPUTS` except tf, which arrived at `now_ns`. Raises ValueError."""
         self._now_ns = now_ns
-        source, tracking_stage = self._sources[camera], self._tracking_stage
-        tracks_with_depth = self._settings.tracker[0].use_depth
+        source, tracking_stage = self._cameras[camera].source, self._tracking_stage
         if topic in INFO_TOPICS:
             images = COLOR_INFO_IMAGES[self._settings.bbox3d[0].depth] if topic == INFO_TOPIC else DEPTH_TOPIC
             message = info_of_images(message, self._settings.name(images, camera))
@@ -116,13 +124,10 @@ class PeoplePipeline(object):
             tracking_stage.add_camera_info(message, camera)
             source.add_camera_info(message, now_ns)
         elif topic == DEPTH_INFO_TOPIC:
-            if tracks_with_depth:
+            if self._settings.tracker[0].use_depth:
                 tracking_stage.add_depth_camera_info(message, camera)
             source.add_depth_camera_info(message, now_ns)
         elif topic == DEPTH_TOPIC:
-            message = uncompressed(message)  # once for all stages
-            if tracks_with_depth:
-                tracking_stage.add_depth(message, now_ns, camera)
             source.add_depth(message, now_ns)
         elif topic == COLOR_TOPIC:
             source.add_color(message, now_ns)
@@ -135,7 +140,7 @@ class PeoplePipeline(object):
         self._now_ns = now_ns
         message = self._boxes2d(camera, header, image, detections, names)
         if message is not None:
-            self._sources[camera].add_boxes(message, now_ns)
+            self._cameras[camera].source.add_boxes(message, now_ns)
 
     def take_results(self):
         """Return the messages that the nodes would have published since the last call, [(topic, message), ...]."""
@@ -153,25 +158,18 @@ class PeoplePipeline(object):
 
     def end(self):
         """Report inputs that are still waiting for others. Call at the end of the input."""
-        for source in self._sources.values():
-            source.end()
+        for pipeline in self._cameras.values():
+            pipeline.source.end()
 
-    def _on_match(self, camera, trigger, *messages):
-        if isinstance(trigger, Boxes2D):
-            with self._events.rejecting('2D boxes'):
-                self._estimate_and_track(camera, self._sources[camera].frame(trigger, *messages), trigger)
-        else:
-            with self.detecting():
-                self._detect(camera, trigger.header, self._sources[camera].frame(trigger, *messages))
-
-    def _detect(self, camera, header, frame):
-        detections = self._detection_stages[camera].detect(frame)
-        if detections is None:
-            return
-        message = self._boxes2d(camera, header, frame.received.color, detections, DepthDetectionStage.names)
-        if message is not None:
-            self._events.count('arrays of 2D boxes')
-            self._estimate_and_track(camera, frame, boxes2d_from_msg(message))
+    def _detect(self, camera, color_msg, *matched):
+        with self.detecting():
+            detected = self._cameras[camera].detect(color_msg, *matched)
+            if detected is None:
+                return
+            image, detections, *shown = detected
+            message = self._boxes2d(camera, color_msg.header, image, detections, DepthDetectionStage.names)
+            if message is not None:
+                self._cameras[camera].estimate(message, *shown)
 
     def _boxes2d(self, camera, header, image, detections, names):
         """Return the message of Detections, None if it is not published."""
@@ -181,10 +179,10 @@ class PeoplePipeline(object):
         self._results.append((topic_of(camera, BOXES_TOPIC), message))
         return message
 
-    def _estimate_and_track(self, camera, frame, boxes2d):
-        boxes3d = self._estimation_stages[camera].estimate(frame, boxes2d)
-        message = boxes3d_to_msg(boxes3d, header_of(frame), frame.received.camera)
+    def _on_boxes3d(self, camera, message, _boxes3d, _frame, depth_msg):
         self._results.append((topic_of(camera, BOXES3D_TOPIC), message))
+        if self._settings.tracker[0].use_depth:
+            self._tracking_stage.add_depth(depth_msg, self._now_ns, camera)
         with self._events.rejecting('3D boxes'):
             self._tracking_stage.add_boxes(message, self._now_ns, camera)
 

@@ -18,7 +18,8 @@ class DetectorWorker(object):
     """Detect objects in the newest images, and publish them for bbox3d_node and as an annotated image.
 
     `params` has `enabled` and `publish_empty`. `detect(*images)` is called in a thread of its own. It returns the RGB
-    image and its Detections, or None if there is no result; `names` are those of the classes, `part` is the node's.
+    image, its Detections, and what the next stage needs with them; or None if there is no result. `names` are those of
+    the classes, `part` is the node's.
 
     Publishes
     ---------
@@ -66,13 +67,13 @@ class DetectorWorker(object):
         finally:  # any outcome, such as a rejected image, shows that the detector works
             self._waits_since_s = None
 
-    def _publish(self, header, image, detections):
+    def _publish(self, header, image, detections, *for_next_stage):
         if len(detections.boxes) or self._publish_empty:
             message = detections2d_to_msg(detections, self._names, header, image.shape[1::-1])
             self._boxes_pub.publish(message)
             self._diagnostics.record_latency(header.stamp)
             if self._next_stage is not None:
-                self._next_stage(message)
+                self._next_stage(message, *for_next_stage)
         else:
             self._diagnostics.record_latency(header.stamp)
         if self._image_pub.get_num_connections():

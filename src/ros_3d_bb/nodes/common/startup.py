@@ -25,13 +25,15 @@ class Part(NamedTuple):
     """How a node is part of its process: alone by default, or beside the others in people_node.
 
     Parameters, services and diagnostics have the names of a node of its own, whose private namespace is `namespace`.
-    `transforms` are shared; None: the node has its own. `next_stage` is called with each result after it is published.
-    `subscribes` states whether the node subscribes to the results of the stage before, and `monitors` whether its
-    diagnostics report on the inputs and subscribers of the process.
+    `transforms` and `inputs`, an RgbdInputs, are shared; None: the node has its own. `next_stage` is called with each
+    result after it is published, and what the next stage needs with it. `subscribes` states whether the node subscribes
+    to the results of the stage before, and `monitors` whether its diagnostics report on the inputs and subscribers of
+    the process.
     """
 
     namespace: str = '~'
     transforms: Any = None
+    inputs: Any = None
     next_stage: Optional[Callable] = None
     subscribes: bool = True
     monitors: bool = True
