@@ -107,6 +107,15 @@ def test_costs_are_around_the_robot_where_it_is_now():
         assert not np.any(bridge.message(COSTS).data)
 
 
+@pytest.mark.parametrize('ahead_s, expected', [(-1.1, 0), (-0.9, 1), (0.9, 1), (1.1, 0)])
+def test_costs_are_withheld_where_the_robot_is_unknown(ahead_s, expected):
+    """Its latest pose is further than ~timeout, 1 s, from the clock."""
+    with bridge_with('costmap') as bridge:
+        bridge.send_tf(START_NS + int(ahead_s * NS), 'base_link', (0, 0, 0))
+        bridge.send(START_NS, person(1, 2, 0))
+        assert bridge.count(COSTS) == expected
+
+
 def test_an_output_waits_for_the_transform_of_its_own_frame_only():
     with bridge_with('costmap, people, teb', planner_frame='odom') as bridge:
         bridge.send_tf(START_NS, 'odom', (0, 0, 0))

@@ -93,7 +93,7 @@ def test_a_transform_of_the_future_does_not_stop_the_latest_pose():
     with masterless() as connections:
         transforms = Transforms(wait_s=0.0)
         for number in range(30):
-            stamp = STAMP + rospy.Duration(number * 0.1)
+            connections.now = stamp = STAMP + rospy.Duration(number * 0.1)
             links = [link(parent, child, stamp) for child, parent in parents.items()]
             links[1].transform.translation.x = number
             if number == 10:
@@ -101,17 +101,17 @@ def test_a_transform_of_the_future_does_not_stop_the_latest_pose():
                 connections.send('/tf', TFMessage(later))
             connections.send('/tf', TFMessage(links))
             if number < 10 or number >= 12:
-                assert transforms.latest('map', 'base_link')[0][0, 3] == number
+                assert transforms.latest('map', 'base_link', 0.5)[0][0, 3] == number
 
 
 def test_one_late_transform_does_not_replace_the_latest_pose():
     with masterless() as connections:
-        transforms = Transforms(wait_s=0.0)
+        transforms, connections.now = Transforms(wait_s=0.0), STAMP
         for seconds in (100, 80):
             connections.send('/tf', TFMessage([link('map', 'base_link', rospy.Time(seconds))]))
         connections.send('/tf', TFMessage([link('map', 'front', STAMP)]))
         assert transforms.lookup('map', 'base_link', rospy.Time(100))[0, 3] == 0
-        transforms.latest('map', 'base_link')
+        transforms.latest('map', 'base_link', 0.5)
         assert transforms.lookup('map', 'base_link', rospy.Time(100))[0, 3] == 0
 
 

@@ -174,14 +174,19 @@ class PlannerBridgeNode(object):
         transforms = {}
         for frame, latest in sorted(set((topic.output.frame, topic.output.latest_tf) for topic in self._topics)):
             try:
-                transforms[frame, latest] = (
-                    SAME_FRAME if frame in ('', header.frame_id) else
-                    self._transforms.lookup(frame, header.frame_id, rospy.Time() if latest else header.stamp))
+                transforms[frame, latest] = self._transform(frame, latest, header)
             except tf2_ros.TransformException as error:
                 self._diagnostics.warn('no transform', 'no transform from %s to %s at %.3f: %s; nothing is published '
                                        'in %s, and an empty array after ~timeout'
                                        % (header.frame_id, frame, header.stamp.to_sec(), error, frame))
         return transforms
+
+    def _transform(self, frame, latest, header):
+        if frame in ('', header.frame_id):
+            return SAME_FRAME
+        if latest:
+            return self._transforms.latest(frame, header.frame_id, self._params.timeout)[0]
+        return self._transforms.lookup(frame, header.frame_id, header.stamp)
 
     def _send(self, topic, now_ns):
         """Publish the latest tracks on one topic, in the form its planner requires, if the transform is known."""

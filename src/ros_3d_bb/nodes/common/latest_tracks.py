@@ -100,16 +100,10 @@ class RobotTracks(LatestTracks):
 
     def robot_from(self, frame_id):
         """Return the latest pose of a frame in that of the robot, (4, 4), and its age in seconds; None, 0 if it is
-        unknown, or older than the timeout."""
+        unknown, or further than the timeout from ROS time."""
         try:
-            robot_from_frame, age_s = self._transforms.latest(self._robot_frame, frame_id)
+            return self._transforms.latest(self._robot_frame, frame_id, self._timeout_s)
         except tf2_ros.TransformException as error:
             self._diagnostics.warn('no transform', 'no transform from %s to %s: %s; waiting for it'
                                    % (frame_id, self._robot_frame, error))
             return None, 0.0
-        if age_s > self._timeout_s:
-            self._diagnostics.warn('old transform', 'the latest transform from %s to %s is %.1f s old, more than '
-                                   '~timeout (%g s); waiting for a newer one'
-                                   % (frame_id, self._robot_frame, age_s, self._timeout_s))
-            return None, 0.0
-        return robot_from_frame, age_s

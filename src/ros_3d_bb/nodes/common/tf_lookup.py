@@ -91,15 +91,25 @@ class Transforms(object):
         """As of the TransformBuffer."""
         return self.buffer.ancestors(frame)
 
-    def latest(self, target_frame, source_frame):
+    def latest(self, target_frame, source_frame, timeout_s):
         """Look up the latest transform, which is that received last after a jump in time, too. Returns it, as `lookup`,
-        and its age in seconds, 0 if only static transforms are between the frames."""
+        and its age in seconds, 0 if it is ahead of ROS time, or only static transforms are between the frames.
+
+        Raises tf2_ros.TransformException as `lookup`, and if it is further than ~timeout from ROS time, before or
+        after: the age of a transform of the future is unknown.
+        """
         target, source = target_frame.lstrip('/'), source_frame.lstrip('/')
         self.buffer.forget_later(target, source)
         target_from_source = self.lookup(target, source, rospy.Time())
         newest = self.buffer.get_latest_common_time(target, source)
-        is_static = not newest or target == source
-        return target_from_source, 0.0 if is_static else max((rospy.get_rostime() - newest).to_sec(), 0.0)
+        if not newest or target == source:
+            return target_from_source, 0.0
+        age_s = (rospy.get_rostime() - newest).to_sec()
+        if abs(age_s) > timeout_s:
+            raise tf2_ros.ExtrapolationException(
+                'the latest one is %.1f s %s ROS time, more than ~timeout (%g s)'
+                % (abs(age_s), 'before' if age_s > 0 else 'after', timeout_s))
+        return target_from_source, max(age_s, 0.0)
 
     def close(self):
         """Unsubscribe from tf."""
