@@ -156,6 +156,38 @@ def test_invalid_ranges_are_ignored(invalid):
     assert corners_from(2.0, changed=changed) == pytest.approx(corners_from(2.0), abs=2 * HALF_BEAM_M)
 
 
+def corners_of_a_wall(ranges_m, least_m=0.1, largest_m=10.0):
+    """Corners (n, 3) that a laser sees beside a wall on its left, y = 1 m, which ends before the beam at 21 degrees.
+    Where the wall is not, ranges (or one for all) are as given. The laser looks from -90 to 90 degrees."""
+    angles = np.radians(np.arange(-90, 91))
+    with np.errstate(divide='ignore'):
+        walls_m = np.where(angles > np.radians(20.5), 1 / np.sin(angles), ranges_m)
+    return blind_corners(walls_m, (least_m, largest_m), angles[0], np.radians(1))
+
+
+@pytest.mark.parametrize('ranges_m, least_m, largest_m', [
+    (np.inf, 0.1, 10.0), (np.inf, 0.1, np.inf), (11.0, 0.1, 10.0), (np.inf, 0.0, 0.0), (5.0, 0.1, 0.0), (0.0, 0.1, 10.0),
+    (0.0, 0.0, 0.0), (np.nan, 0.1, 10.0), (-np.inf, 0.1, np.inf)])
+def test_what_is_not_measured_is_no_free_space(ranges_m, least_m, largest_m):
+    """Some drivers report 0 or nan where nothing is in range, and leave out the limits."""
+    (x, y, _z), = corners_of_a_wall(ranges_m, least_m, largest_m)
+    assert (x, y) == pytest.approx((1 / np.tan(np.radians(21)), 1.0))
+
+
+@pytest.mark.parametrize('first_deg, step_deg, value', [(0, 1, np.nan), (0, 1, 0.0), (np.nan, 1, 2.0), (0, 0, 2.0)])
+def test_a_scan_without_information_is_rejected(first_deg, step_deg, value):
+    with pytest.raises(ValueError, match='none of its 9 beams'):
+        blind_corners(np.full(9, value), (0.1, 10.0), np.radians(first_deg), np.radians(step_deg))
+
+
+@pytest.mark.parametrize('beams, corners', [(9, 0), (11, 2)])
+def test_a_gap_in_an_obstacle_is_an_opening_if_a_person_fits_into_it(beams, corners):
+    """Across the ends of a full circle, at 2 m: 10 degrees are 0.35 m."""
+    ranges_m = np.full(360, 2.0)
+    ranges_m[:beams // 2] = ranges_m[beams // 2 - beams:] = np.nan
+    assert len(blind_corners(ranges_m, (0.1, 10.0), 0.0, np.radians(1))) == corners
+
+
 @pytest.mark.parametrize('first_deg', [-180, -8, 0, 5, 9])
 @pytest.mark.parametrize('step_deg', [1, -1])
 def test_an_obstacle_across_the_ends_of_a_full_circle_has_two_corners(first_deg, step_deg):

@@ -214,6 +214,18 @@ def test_the_robot_stops_before_the_whole_length_of_a_bicycle():
         assert 1.0 < 0.3 * speed_mps + speed_mps ** 2 / 2 <= 1.175
 
 
+@pytest.mark.parametrize('range_m, expected', [(5.0, 2.0), (0.0, 0.3), (np.nan, 0.3)])
+def test_a_scan_without_information_limits_the_speed_as_no_scan_does(range_m, expected):
+    with masterless({'use_scan': True}) as connections:
+        robot, connections.now = Robot(connections), time_from(START_NS)
+        robot.send_tf(START_NS)
+        connections.send('scan', LaserScan(
+            header=Header(stamp=connections.now, frame_id='base_link'), angle_min=-1.5, angle_increment=0.01,
+            range_min=0.1, range_max=10.0, ranges=[range_m] * 301))
+        robot.forwarded(START_NS)
+        assert robot.limit() == pytest.approx(expected) and ('scans rejected' in robot.counts) == (expected < 2)
+
+
 def goals_sent(distance_m, seconds):
     """Number of goals for a robot that does not move, with a person who stands ahead."""
     with masterless({'output': 'goal', 'enabled': True}) as connections:

@@ -73,18 +73,27 @@ def highest_safe_speed(tracks, age_s, robot_from_tracks, velocity, params, pose_
 def blind_corners(ranges_m, limits_m, first_angle, step):
     """Blind corners (n, 3) in a planar scan, in the frame of the laser.
 
-    The ranges (n,) are as in REP 117: infinite without a return, nan if they are invalid; `limits_m` are the least and
-    the largest one of the laser. The angles are those of the first beam and between two beams.
+    The ranges (n,) are as in REP 117: infinite without a return, nan or less than the least one of the laser if they
+    are invalid. `limits_m` are the least and the largest one; 0: unlimited. The angles are those of the first beam and
+    between two beams. Where people would fit between beams that are valid, invalid ones are taken for an opening:
+    older drivers report 0 without a return, and depthimage_to_laserscan nan. Raises ValueError if no range is valid.
     """
     least_m, largest_m = limits_m
-    limited_m = np.minimum(ranges_m, largest_m)
+    ranges_m, largest_m = np.array(ranges_m, float), largest_m if largest_m > 0 else np.inf
     with np.errstate(invalid='ignore'):  # nan
-        is_valid = limited_m >= least_m
-    points_m, limited_m = scan_points(limited_m, first_angle, step)[is_valid], limited_m[is_valid]
+        is_valid = (ranges_m >= least_m) & (ranges_m > 0)
+    if not (is_valid.any() and np.isfinite([first_angle, step]).all() and step):
+        raise ValueError('none of its %d beams has a range of at least %g m and an angle (first %g, step %g rad)'
+                         % (len(ranges_m), least_m, first_angle, step))
+    is_circle = abs(step) * (len(ranges_m) + 1) > 2 * np.pi
+    limited_m = np.minimum(np.where(is_valid, ranges_m, np.inf), largest_m)
+    is_used = is_valid | _is_opening(limited_m, is_valid, step, is_circle)
+    points_m, limited_m = scan_points(limited_m, first_angle, step)[is_used], limited_m[is_used]
     count = len(limited_m)
-    if abs(step) * (len(ranges_m) + 1) > 2 * np.pi:  # a full circle is taken twice: obstacles across its ends are whole
+    if is_circle:  # taken twice: obstacles across its ends are whole
         points_m, limited_m = np.tile(points_m, (2, 1)), np.tile(limited_m, 2)
-    jumps_m = np.diff(limited_m)
+    with np.errstate(invalid='ignore'):  # between two infinite ranges
+        jumps_m = np.diff(limited_m)
     before, = np.nonzero(np.abs(jumps_m) > LEAST_ROOM_M)  # the last beams on obstacles
     if not len(before):
         return np.zeros((0, 3))
@@ -93,6 +102,20 @@ def blind_corners(ranges_m, limits_m, first_angle, step):
     is_next = (jumps_m[before] < 0).astype(int)  # whether the nearer obstacle is the next one
     corners = (before + is_next)[is_wide[np.arange(len(before)) + is_next]]
     return points_m[np.unique(corners % count)]
+
+
+def _is_opening(ranges_m, is_valid, step, is_circle):
+    """Whether a person fits between the valid beams beside each invalid one, at the range of the farther of both.
+    Beams before the first and after the last one are those of a full circle, or missing."""
+    if is_circle:
+        is_opening = _is_opening(np.tile(ranges_m, 3), np.tile(is_valid, 3), step, False)
+        return is_opening[len(ranges_m):2 * len(ranges_m)]
+    numbers, count = np.arange(len(ranges_m)), len(ranges_m)
+    before = np.maximum.accumulate(np.where(is_valid, numbers, -1))
+    after = np.minimum.accumulate(np.where(is_valid, numbers, count)[::-1])[::-1]
+    valid_m = np.append(np.where(is_valid, ranges_m, 0), 0)  # also of the numbers -1 and count
+    width_m = np.maximum(valid_m[before], valid_m[after]) * abs(step) * np.maximum(after - before, 1)
+    return ~is_valid & (width_m >= LEAST_WIDTH_M)
 
 
 def speed_before_corners(corners_m, age_s, velocity, params, corner_params):
