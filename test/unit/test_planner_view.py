@@ -4,7 +4,7 @@ from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from, transform_points
 from ros_3d_bb.camera.images import DepthImage
-from ros_3d_bb.planning.people_removal import are_inside, cylinders_of, pixels_inside, scan_points
+from ros_3d_bb.planning.people_removal import are_inside, cylinders_of, pixels_inside, scan_parts, scan_points
 from ros_3d_bb.planning.planner_view import (covariances_after, footprint_points, in_frame, position_after,
                                              predicted_to, usable_tracks, with_usable_covariances)
 from ros_3d_bb.tracking.types import OUT_OF_VIEW
@@ -149,8 +149,28 @@ def test_cylinders_are_where_people_are_then_and_wider_if_uncertain():
     dog = track_at([0, 0, 0.3], [0, 0, 0])._replace(label='dog')
     (x, y, radius_m, low_m, high_m), = cylinders_of([walking, dog], 0.3, MARGIN_M)
     assert (x, y, radius_m) == pytest.approx((2.3, 1.0, 0.25 + MARGIN_M + 0.2))
-    assert (low_m, high_m) == pytest.approx((-MARGIN_M, 1.7 + MARGIN_M))
+    assert high_m == pytest.approx(1.7 + MARGIN_M) and -2 < low_m <= -MARGIN_M
     assert cylinders_of([], 0.3, MARGIN_M).shape == (0, 5)
+
+
+@pytest.mark.parametrize('seen_from_m', [0.0, 0.5, 0.75, 1.2])
+def test_a_person_whose_legs_are_hidden_from_the_camera_reaches_the_floor(seen_from_m):
+    """A laser below the desk sees the legs."""
+    track = track_at([2, 0, (seen_from_m + 1.7) / 2], [0, 0, 0])
+    track = track._replace(size_m=np.array([0.5, 0.5, 1.7 - seen_from_m]))
+    assert are_inside(np.array([[2.0, 0.1, 0.02], [2.0, 0.1, 0.2]]), cylinders_of([track], 0.0, MARGIN_M)).all()
+
+
+@pytest.mark.parametrize('count, increment_s, expected', [
+    (10, 0.005, [(0, 4, 0.0075), (4, 8, 0.0275), (8, 12, 0.0425)]), (3, 0.1, [(0, 1, 0.0), (1, 2, 0.1), (2, 3, 0.2)])])
+def test_a_scan_is_divided_into_parts_of_nearly_the_same_time(count, increment_s, expected):
+    parts = [(part.start, part.stop, pytest.approx(later_s)) for part, later_s in scan_parts(count, increment_s)]
+    assert parts == expected
+
+
+@pytest.mark.parametrize('count, increment_s', [(0, 0.01), (5, 0.0), (5, -0.1), (5, np.nan), (5, np.inf), (500, 0.1)])
+def test_a_scan_without_plausible_times_is_one_part(count, increment_s):
+    assert scan_parts(count, increment_s) == [(slice(None), 0.0)]
 
 
 def test_beams_that_end_at_a_person_are_found_and_others_are_not():

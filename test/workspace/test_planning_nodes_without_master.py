@@ -6,6 +6,7 @@ from sensor_msgs.msg import Image, LaserScan, PointCloud2, PointField
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
+from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, time_from, tracks_to_msg
@@ -58,6 +59,39 @@ def test_beams_that_end_at_a_person_become_nan():
         found = sent(connections, 'scan', scan())
         assert np.isnan(found.ranges).tolist() == [False, True, False] and found.header == scan().header
         assert connections.counts['scan without people'] == 1
+
+
+PERIOD_S, RATE = 1 / 5.5, 1.0  # of a slow laser, on a robot that turns
+
+
+def seen_while_turning(person_m, walks_mps=0.0):
+    """Full scan (n,) of a person, from the back to the left; the laser turns by 0.18 rad meanwhile. The person walks
+    along x. None of the beams is nearer, all others are infinite."""
+    later_s = PERIOD_S / 720 * np.arange(720)
+    angles = -np.pi + 2 * np.pi / 720 * np.arange(720) + RATE * later_s
+    along = person_m[0] + walks_mps * later_s, person_m[1]
+    middle_m = along[0] * np.cos(angles) + along[1] * np.sin(angles)
+    beside2 = along[0] ** 2 + along[1] ** 2 - middle_m ** 2
+    return np.where((middle_m > 0) & (beside2 < 0.25 ** 2), middle_m - np.sqrt(np.maximum(0.0625 - beside2, 0)), np.inf)
+
+
+@pytest.mark.parametrize('bearing_deg', [30, 150])
+@pytest.mark.parametrize('walks_mps', [0.0, 2.0])
+def test_beams_are_removed_at_the_pose_of_each_beam(bearing_deg, walks_mps):
+    person_m = 4.0 * np.cos(np.radians(bearing_deg)), 4.0 * np.sin(np.radians(bearing_deg))
+    ranges_m = seen_while_turning(person_m, walks_mps)
+    message = LaserScan(header=Header(stamp=time_from(STAMP_NS), frame_id='base_link'), angle_min=-np.pi,
+                        angle_increment=2 * np.pi / 720, time_increment=PERIOD_S / 720, ranges=ranges_m.tolist())
+    with node_with('scan', person(1, *person_m, speed=walks_mps), age_ns=0) as connections:
+        one_pose = sent(connections, 'scan', message).ranges
+        assert connections.counts['scan at one pose'] == 1
+        for later_s in np.arange(0, 0.21, 0.02):
+            turned = transform_from((0, 0, 0), (0, 0, np.sin(RATE * later_s / 2), np.cos(RATE * later_s / 2)))
+            connections.send('/tf', TFMessage(transform_messages(
+                time_from(STAMP_NS + int(later_s * NS)), [('map', 'base_link', turned)])))
+        moving = sent(connections, 'scan', message).ranges
+        assert np.isfinite(ranges_m).sum() > 10 and not np.isfinite(moving).any()
+        assert np.isfinite(one_pose).any()
 
 
 @pytest.mark.parametrize('frame_id, age_ns, counter', [

@@ -2,6 +2,7 @@
 import functools
 from typing import NamedTuple
 
+import numpy as np
 import rospy
 import tf2_ros
 from sensor_msgs.msg import Image, LaserScan, PointCloud2
@@ -9,7 +10,7 @@ from sensor_msgs.msg import Image, LaserScan, PointCloud2
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.conversions.camera_msgs import uncompressed
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
-from ros_3d_bb.conversions.perception_msgs import camera_from_msg, stamp_of
+from ros_3d_bb.conversions.perception_msgs import camera_from_msg, stamp_of, time_from
 from ros_3d_bb.conversions.range_msgs import cloud_without, depth_without, points_of_cloud, scan_without
 from ros_3d_bb.core.params import DEPTH_SCALE, TRACKS_TIMEOUT, Param, parameters
 from ros_3d_bb.core.time_sync import NS
@@ -18,7 +19,7 @@ from ros_3d_bb.nodes.common.latest_tracks import LatestTracks
 from ros_3d_bb.nodes.common.startup import read_params
 from ros_3d_bb.nodes.common.subscribers import subscribe, subscribe_camera_info
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
-from ros_3d_bb.planning.people_removal import are_inside, cylinders_of, pixels_inside, scan_points
+from ros_3d_bb.planning.people_removal import are_inside, cylinders_of, pixels_inside, scan_parts, scan_points
 
 KINDS = {'scan': LaserScan, 'points': PointCloud2, 'depth': Image}
 
@@ -40,8 +41,9 @@ class PeopleRemovalNode(object):
     """Remove tracked people from laser scans, point clouds and depth images.
 
     The outputs are for costmaps, SLAM and localisation, which take people for obstacles that stay. People are where
-    their tracks predict them at the stamp of the measurements. Without tracks for ~timeout, a transform, or the
-    camera_info of depth images, measurements pass as they are, and so do those of another layout.
+    their tracks predict them at the time of the measurements, in scans with a time_increment that of each beam, and
+    reach the floor. Without tracks for ~timeout, a transform, or the camera_info of depth images, measurements pass as
+    they are, and so do those of another layout.
     Parameters: config/people_removal.yaml.
 
     Subscribes
@@ -97,12 +99,10 @@ class PeopleRemovalNode(object):
         newest = self._tracks.newest()
         try:
             if newest is not None:
-                ahead_s = (stamp_of(message) - newest.stamp_ns) / NS
-                cylinders = cylinders_of(newest.tracks, ahead_s, self._params.margin)
-                fixed_from_sensor = self._transforms.lookup(newest.frame_id, message.header.frame_id,
-                                                            message.header.stamp)
+                around = functools.partial(self._around, newest, message)
+                _fixed_from_sensor, cylinders = around()
                 self._diagnostics.count(name + ' without people')
-                return remover(message, fixed_from_sensor, cylinders) if len(cylinders) else message
+                return remover(message, around) if len(cylinders) else message
             self._diagnostics.warn('no recent tracks', 'no recent tracks: people are not removed')
         except tf2_ros.TransformException as error:
             self._diagnostics.warn('no transform', 'no transform from %s to %s: %s; people are not removed from %s'
@@ -111,16 +111,39 @@ class PeopleRemovalNode(object):
             self._diagnostics.warn('%s with people' % name, '%s; people are not removed from %s' % (error, name))
         return message
 
-    def _without_in_scan(self, message, fixed_from_sensor, cylinders):
-        points_m = scan_points(message.ranges, message.angle_min, message.angle_increment)
-        return scan_without(message, are_inside(transform_points(fixed_from_sensor, points_m), cylinders))
+    def _around(self, newest, message, later_s=0.0):
+        """Return the pose (4, 4) of a sensor, and the cylinders of people, at a time after the stamp of a message."""
+        stamp_ns = stamp_of(message) + int(later_s * NS)
+        cylinders = cylinders_of(newest.tracks, (stamp_ns - newest.stamp_ns) / NS, self._params.margin)
+        return self._transforms.lookup(newest.frame_id, message.header.frame_id, time_from(stamp_ns)), cylinders
 
-    def _without_in_cloud(self, message, fixed_from_sensor, cylinders):
+    def _without_in_scan(self, message, around):
+        points_m = scan_points(message.ranges, message.angle_min, message.angle_increment)
+        is_removed = np.zeros(len(points_m), bool)
+        for part, later_s in self._parts_of(message, around):
+            fixed_from_sensor, cylinders = around(later_s)
+            is_removed[part] = are_inside(transform_points(fixed_from_sensor, points_m[part]), cylinders)
+        return scan_without(message, is_removed)
+
+    def _parts_of(self, message, around):
+        """Return the `scan_parts`; the whole scan, as if measured at its stamp, if there is no transform at its end."""
+        parts = scan_parts(len(message.ranges), message.time_increment)
+        try:
+            around(parts[-1][1])
+            return parts
+        except tf2_ros.TransformException as error:
+            self._diagnostics.warn('scan at one pose', 'no transform at the last beam of the scan: %s; the pose at its '
+                                   'stamp is used for all beams' % error)
+            return scan_parts(len(message.ranges), 0.0)
+
+    def _without_in_cloud(self, message, around):
+        fixed_from_sensor, cylinders = around()
         points_m = transform_points(fixed_from_sensor, points_of_cloud(message))
         return cloud_without(message, are_inside(points_m, cylinders))
 
-    def _without_in_depth(self, message, fixed_from_sensor, cylinders):
+    def _without_in_depth(self, message, around):
         depth = imgmsg_to_depth(message, self._params.depth_scale, check_unit=True)
         if self._camera is None or depth.shape != (self._camera.height, self._camera.width):
             raise ValueError('there is no camera_info with its size, %d x %d' % depth.shape[::-1])
+        fixed_from_sensor, cylinders = around()
         return depth_without(message.header, depth, pixels_inside(depth, self._camera, fixed_from_sensor, cylinders))
