@@ -166,8 +166,8 @@ def corners_of_a_wall(ranges_m, least_m=0.1, largest_m=10.0):
 
 
 @pytest.mark.parametrize('ranges_m, least_m, largest_m', [
-    (np.inf, 0.1, 10.0), (np.inf, 0.1, np.inf), (11.0, 0.1, 10.0), (np.inf, 0.0, 0.0), (5.0, 0.1, 0.0), (0.0, 0.1, 10.0),
-    (0.0, 0.0, 0.0), (np.nan, 0.1, 10.0), (-np.inf, 0.1, np.inf)])
+    (np.inf, 0.1, 10.0), (np.inf, 0.1, np.inf), (11.0, 0.1, 10.0), (np.inf, 0.0, 0.0), (5.0, 0.1, 0.0),
+    (0.0, 0.1, 10.0), (0.0, 0.0, 0.0), (np.nan, 0.1, 10.0), (-np.inf, 0.1, np.inf)])
 def test_what_is_not_measured_is_no_free_space(ranges_m, least_m, largest_m):
     """Some drivers report 0 or nan where nothing is in range, and leave out the limits."""
     (x, y, _z), = corners_of_a_wall(ranges_m, least_m, largest_m)
