@@ -1,3 +1,4 @@
+import contextlib
 import multiprocessing
 import os
 import pathlib
@@ -9,7 +10,7 @@ import pytest
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.images import DepthImage
-from ros_3d_bb.core.atomic_file import atomic_write
+from ros_3d_bb.core.atomic_file import atomic_write, check_writable
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.sessions import session_writer
@@ -161,3 +162,12 @@ def test_the_file_mode_follows_the_umask(tmp_path):
     finally:
         os.umask(mask)
     assert stat.S_IMODE(os.stat(str(tmp_path / 'file')).st_mode) == 0o640
+
+
+@pytest.mark.parametrize('path, is_writable', [('new', True), ('old', True), ('folder', False), ('missing/new', False)])
+def test_it_is_checked_before_the_work_whether_a_file_can_be_written(tmp_path, path, is_writable):
+    (tmp_path / 'folder').mkdir()
+    (tmp_path / 'old').write_text('old')
+    with contextlib.ExitStack() if is_writable else pytest.raises(OSError, match=path):
+        check_writable(str(tmp_path / path))
+    assert sorted(os.listdir(str(tmp_path))) == ['folder', 'old'] and (tmp_path / 'old').read_text() == 'old'

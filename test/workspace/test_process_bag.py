@@ -1,6 +1,7 @@
 import filecmp
 import os
 import re
+import signal
 import subprocess
 
 import genpy.dynamic
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 import rosbag
 import tf2_ros
+from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.bags.bag_pipeline import process_bag
@@ -21,6 +23,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.pipeline.people_pipeline import Settings
 from ros_3d_bb.sessions.session_reader import read_session
 from support.bags import changed_bag, messages_in, scene_bag
+from support.ros import wait_until
 
 SCENE = {'duration': 1.5, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]},
                                                    {'start': [4.0, -0.8]}]}
@@ -182,6 +185,37 @@ def test_transforms_of_another_frame_with_old_stamps_change_nothing():
             transforms.lookup('map', 'base', time_from(int((now_s + 0.1) * NS)))
     for number in range(99):
         transforms.lookup('map', 'base', time_from(int((100.05 + number / 10) * NS)))
+
+
+def test_an_output_that_cannot_be_written_is_named_before_the_work(scene, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr('ros_3d_bb.bags.bag_pipeline.BagRun.outputs', lambda _run: pytest.fail('it began'))
+    (tmp_path / 'folder').mkdir()
+    for target in (tmp_path / 'folder', tmp_path / 'missing' / 'out.bag'):
+        with pytest.raises(SystemExit) as error:
+            main([scene, str(target), '--detector', 'depth'])
+        assert error.value.code == 1 and str(target) in capsys.readouterr().err
+    assert os.listdir(str(tmp_path)) == ['folder']
+
+
+def test_two_bags_that_are_written_to_one_name_are_both_whole(tmp_path):
+    """Each image of the first bag is followed by the whole second one."""
+    def images(count, meanwhile=lambda: None):
+        for number in range(count):
+            meanwhile()
+            yield number + 1, [('text', String('some text'))]
+    path = str(tmp_path / 'out.bag')
+    assert write_bag(images(3, lambda: write_bag(images(5), path)), path) == 3
+    assert len(messages_in(path)['/text']) == 3 and os.listdir(str(tmp_path)) == ['out.bag']
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_leaves_no_incomplete_bag(scene, tmp_path, number):
+    command = subprocess.Popen(['rosrun', 'ros_3d_bb', 'process_bag', scene, str(tmp_path / 'out.bag'), '--detector',
+                                'depth'], preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL))
+    wait_until(lambda: os.listdir(str(tmp_path)), 'an incomplete bag')
+    os.kill(command.pid, number)
+    assert command.wait(60) == 128 + number and os.listdir(str(tmp_path)) == []
 
 
 def test_broken_bags_are_named(scene, tmp_path, capsys):

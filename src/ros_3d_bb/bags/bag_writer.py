@@ -12,6 +12,7 @@ from std_msgs.msg import Header
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from
 from ros_3d_bb.conversions.camera_msgs import START_NS, CameraFrame, messages_of
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, boxes2d_to_msg, time_from
+from ros_3d_bb.core.atomic_file import clean_up_on_sigterm, replacement_of
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 
@@ -36,8 +37,7 @@ def write_bag(images, path, compression='lz4'):
 @contextlib.contextmanager
 def new_bag(path, compression):
     """Open a rosbag.Bag for writing. It has a temporary name until the block ends without an error."""
-    partial = path + PARTIAL
-    try:
+    with replacement_of(path, os.path.basename(path) + '.', PARTIAL) as partial:
         bag = rosbag.Bag(partial, 'w', compression=compression)
         try:
             yield bag
@@ -46,10 +46,6 @@ def new_bag(path, compression):
                 bag.close()
             raise
         bag.close()
-        os.replace(partial, path)
-    finally:
-        with contextlib.suppress(FileNotFoundError):
-            os.remove(partial)
 
 
 def images_in(path, topics):
@@ -119,6 +115,7 @@ def bag_command_parser(name, doc):
 
 def write_bag_of_command(parser, arguments, images):
     """Write the bag of a command. Print the cause and exit with 1 if a session or a scenario cannot be read."""
+    clean_up_on_sigterm()
     try:
         count = write_bag(images(), arguments.bag, arguments.compression)
     except (ValueError, OSError) as error:

@@ -9,6 +9,7 @@ import yaml
 from ros_3d_bb.bags.bag_pipeline import NOT_KEPT, process_bag
 from ros_3d_bb.bags.bag_reader import BagError
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, STATIC_TOPIC, TF_TOPIC
+from ros_3d_bb.core.atomic_file import clean_up_on_sigterm
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.core.params import IMAGE_ROTATION, nearest_name, params_from, with_places
 from ros_3d_bb.core.yaml_loader import load_yaml
@@ -34,6 +35,7 @@ def main(arguments=None):
         settings = _settings_from(given)
     except (ValueError, OSError, yaml.YAMLError) as error:
         parser.error(str(error))
+    clean_up_on_sigterm()
     try:
         events = process_bag(given.source, given.target, settings)
     except KeyboardInterrupt:

@@ -6,9 +6,10 @@ dictionary. Errors that it raises are printed here.
 import argparse
 import importlib
 import json
-import signal
 import subprocess
 import sys
+
+from ros_3d_bb.core.atomic_file import check_writable, clean_up_on_sigterm
 
 MODULES = {'accuracy': 'accuracy', 'tracking': 'tracking.benchmark', 'prediction': 'tracking.prediction_benchmark',
            'scenes': 'scene_benchmark', 'speed': 'speed', 'latency': 'latency.benchmark',
@@ -26,8 +27,10 @@ def main(words):
     module.add_options(parser)
     parser.add_argument('--json', metavar='FILE', help='also write the result to FILE')
     arguments = parser.parse_args(words[1:])
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # runs the cleanup, which ends all processes
+    clean_up_on_sigterm()  # ends all processes
     try:
+        if arguments.json:
+            check_writable(arguments.json)
         result = module.run(arguments)
         if arguments.json:
             with open(arguments.json, 'w') as stream:

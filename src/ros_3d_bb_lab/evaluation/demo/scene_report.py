@@ -17,7 +17,7 @@ from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, absolute, topic_of
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg, stamp_of,
                                                    tracks_from_msg, transform_from_msg)
-from ros_3d_bb.core.atomic_file import atomic_write
+from ros_3d_bb.core.atomic_file import atomic_write, check_writable
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb.visualization.image_overlay import draw_boxes, draw_caption
@@ -248,6 +248,8 @@ def main():
     picture += '' if os.path.splitext(picture)[1] else '.png'
     output = 'report'
     try:
+        for path in filter(None, (picture, arguments.csv)):
+            check_writable(path)
         lines = write_report(arguments.bag, picture, arguments.color_topic)
         if arguments.csv:
             output = 'table'
