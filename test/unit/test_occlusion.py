@@ -90,3 +90,16 @@ def test_a_pole_before_an_arm_does_not_occlude_the_person():
     depth_mm = np.full((480, 640), 5000)
     depth_mm[:, 345:375] = 1500
     assert place(3, 0, with_depth(depth_mm)) == VISIBLE
+
+
+@pytest.mark.parametrize('roll_deg,half', [(0, 0.6), (90, 0.45)])
+def test_the_outline_of_a_view_has_its_horizontal_edges_as_sides(roll_deg, half):
+    """A camera at (1, 2) that looks along y and down, upright and in portrait."""
+    pose = mounted(1.0, pitch_deg=20, yaw_deg=90, roll_deg=roll_deg)
+    pose[:2, 3] = 1, 2
+    camera = Camera(640, 480, 533.3, 533.3, 320, 240)
+    place_m, left_m, right_m = CameraView(pose, camera).outline(4.0)
+    side = np.arctan(half / np.cos(np.radians(20)))
+    np.testing.assert_allclose(place_m, (1, 2))
+    np.testing.assert_allclose(left_m - place_m, (-4 * np.sin(side), 4 * np.cos(side)), atol=0.01)
+    np.testing.assert_allclose(right_m - place_m, (4 * np.sin(side), 4 * np.cos(side)), atol=0.01)

@@ -79,8 +79,6 @@ CASES = [
     ('navigation.launch global_costmap:=social', {
         '/planner_bridge_node/outputs': 'costmap, people',
         'global layers': ['static_layer', 'obstacle_layer', 'people_layer', 'proxemic_layer', 'inflation_layer']}),
-    ('pipeline.launch detector:=depth rviz:=true camera_image:=rgb/image/compressed', {
-        'rviz:camera/color/image_raw': 'rgb/image'}),
     ('pipeline.launch detector:=depth depth:=raw', {
         '/depth_detector_node/depth': 'raw', '/bbox3d_node/depth': 'raw', '/tracker_node/depth': 'raw',
         'people_node:camera/depth/image_rect_raw': 'camera/depth/image_rect_raw'}),
@@ -89,7 +87,7 @@ CASES = [
         '/tracker_node/cameras': 'front', '/people_node/detector': None}),
     ('pipeline.launch detector:=depth depth:=raw rviz:=true cameras:="front, rear"', {
         '/front/depth_detector_node/depth': 'raw', '/rear/bbox3d_node/depth': 'raw', '/tracker_node/depth': 'raw',
-        '/tracker_node/cameras': 'front, rear', 'rviz:camera/color/image_raw': 'front/color/image_raw',
+        '/tracker_node/cameras': 'front, rear', 'rviz:yolo_result_out': 'front/yolo_result_out',
         'bbox3d_node:camera/depth/image_rect_raw': 'depth/image_rect_raw',  # in the namespace of its camera
         'tracker_node:camera/depth/image_rect_raw': 'camera/depth/image_rect_raw'}),
     ('pipeline.launch weights:=/some.pt floor_frame:=none', {

@@ -4,11 +4,12 @@ from visualization_msgs.msg import Marker
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE
-from ros_3d_bb.visualization.markers import AREA, NAMESPACES as ALL_NAMESPACES, PALETTE, MarkerParams, MarkerWriter
+from ros_3d_bb.visualization.markers import (AREA, NAMESPACES as ALL_NAMESPACES, PALETTE, VIEW, MarkerParams,
+                                             MarkerWriter)
 from support.ros import header_at
 from support.tracks import track_at
 
-NAMESPACES = [name for name in ALL_NAMESPACES if name != AREA]  # of tracks
+NAMESPACES = [name for name in ALL_NAMESPACES if name not in (AREA, VIEW)]  # of tracks
 ALL = MarkerParams(marker_namespaces=NAMESPACES)
 SECOND_NS = 1000 * NS
 
@@ -134,11 +135,12 @@ def test_new_parameters_apply_to_the_next_image():
     assert all(marker.lifetime.to_sec() == 0.5 for marker in markers.markers if marker.action == Marker.ADD)
 
 
-def test_ignored_areas_are_outlines_on_the_floor_until_removed():
+@pytest.mark.parametrize('namespace,attribute', [(AREA, 'areas_m'), (VIEW, 'views_m')])
+def test_areas_and_views_are_outlines_on_the_floor_until_removed(namespace, attribute):
     writer = MarkerWriter(MarkerParams())
-    writer.areas_m = [np.array([[1.0, 2.0], [3.0, 2.0], [3.0, 4.0]])]
+    setattr(writer, attribute, [np.array([[1.0, 2.0], [3.0, 2.0], [3.0, 4.0]])])
     marker, = writer.write([], header_at(SECOND_NS, 'map')).markers
-    assert (marker.ns, marker.id, marker.type) == (AREA, 0, Marker.LINE_STRIP)
+    assert (marker.ns, marker.id, marker.type) == (namespace, 0, Marker.LINE_STRIP)
     np.testing.assert_allclose(xyz(marker)[:, :2], [[1, 2], [3, 2], [3, 4], [1, 2]])
-    writer.areas_m = []
-    assert keys(writer.write([], header_at(2 * SECOND_NS, 'map')), Marker.DELETE) == [(AREA, 0)]
+    setattr(writer, attribute, [])
+    assert keys(writer.write([], header_at(2 * SECOND_NS, 'map')), Marker.DELETE) == [(namespace, 0)]

@@ -128,6 +128,7 @@ class TrackerNode(object):
         self._tracks_pub.publish(tracks_to_msg(tracks, header))
         self._diagnostics.record_latency(header.stamp)
         if self._markers_pub.get_num_connections():
+            self._markers.views_m = self._stage.views_m
             self._markers_pub.publish(self._markers.write(tracks, header))
 
 

@@ -189,5 +189,6 @@ class PeoplePipeline(object):
     def _on_tracks(self, tracks, header):
         if tracks:
             self._events.count(TRACKED)
+        self._markers.views_m = self._tracking_stage.views_m
         self._results += [(TRACKS_TOPIC, tracks_to_msg(tracks, header)),
                           (MARKERS_TOPIC, self._markers.write(tracks, header))]

@@ -33,6 +33,7 @@ AHEAD, BEHIND = 'images ahead of other cameras', 'images behind other cameras'  
 CONTRADICTION = 'cameras that contradict each other'  # event, reported once
 NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/\w+)*$')
 PLACES = 'where no track starts'  # section of the parameters
+SHOWN_RANGE_M = 6.0  # of the field of view, as shown; that of the depth detector
 
 
 @parameters()
@@ -119,6 +120,12 @@ class TrackingStage(object):
     def ignored_areas(self):
         """Polygons, arrays (n, 2) in the target frame, in which no track starts."""
         return self._areas.polygons
+
+    @property
+    def views_m(self):
+        """Outlines, arrays (3, 2) in the target frame, of the fields of view of the cameras."""
+        return [CameraView(pose.target_from_camera, self._intrinsics[camera]).outline(SHOWN_RANGE_M)
+                for camera, pose in sorted(self._poses.items()) if camera in self._intrinsics]
 
     def set_map(self, message):
         """Start no tracks in the occupied cells of a nav_msgs/OccupancyGrid. With the first one, those there end.

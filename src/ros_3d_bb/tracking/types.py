@@ -4,7 +4,7 @@ from typing import Callable, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.camera_model import Camera, transform_points
 from ros_3d_bb.camera.images import quarter_turns
 from ros_3d_bb.core.object_classes import PERSON, ObjectClasses
 
@@ -119,6 +119,16 @@ class CameraView(NamedTuple):
         offsets = np.asarray(positions_m)[:, :2] - self.fixed_from_camera[:2, 3]
         bearings = np.arctan2(ahead[0] * offsets[:, 1] - ahead[1] * offsets[:, 0], offsets.dot(ahead))
         return np.hypot(offsets[:, 0], offsets[:, 1]), bearings
+
+    def outline(self, range_m):
+        """Corners (3, 2) of the field of view in the plane: the camera, and the left and right edge at `range_m`."""
+        (width, height), ahead = self.intrinsics[:2], self.ahead
+        edges_px = (0, height / 2), (width, height / 2), (width / 2, 0), (width / 2, height)
+        edges_m = transform_points(self.fixed_from_camera, self.intrinsics.deproject(edges_px, 1.0))
+        _distances_m, bearings = self.bearings(edges_m)
+        sides = [ahead.dot([[np.cos(bearing), np.sin(bearing)], [-np.sin(bearing), np.cos(bearing)]])
+                 for bearing in (bearings.max(), bearings.min())]
+        return self.fixed_from_camera[:2, 3] + range_m * np.vstack(([(0, 0)], sides))
 
 
 class TrackedObject(NamedTuple):

@@ -14,7 +14,8 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
 
 MARKERS_TOPIC = 'visualization_marker_array'
-NAMESPACES = 'cylinder', 'id', 'velocity', 'prediction', 'history', 'ellipse', 'ignored_area', 'prediction_ellipse'
+NAMESPACES = ('cylinder', 'id', 'velocity', 'prediction', 'history', 'ellipse', 'ignored_area', 'field_of_view',
+              'prediction_ellipse')
 BLUE, GREEN, RED = (0.1, 0.3, 1.0), (0.1, 0.9, 0.2), (0.95, 0.1, 0.1)
 AMBER, GREY, WHITE = (1.0, 0.65, 0.1), (0.65, 0.65, 0.65), (0.95, 0.95, 0.95)
 # Neighbours differ most. None is red, green or grey, because arrows and tracks that are not visible have these colours.
@@ -27,9 +28,10 @@ MIN_ARROW_M = 0.05  # RViz cannot orient an arrow without length
 # Diameters of shaft and head. If both arrows have the same direction, the tip of the thin one remains visible.
 VELOCITY_SCALE, PREDICTION_SCALE = Vector3(0.07, 0.14, 0), Vector3(0.04, 0.11, 0)
 # Height of the text, and widths of the lines.
-TEXT_SCALE, HISTORY_SCALE = Vector3(0, 0, 0.35), Vector3(0.05, 0, 0)
+TEXT_SCALE, HISTORY_SCALE = Vector3(0, 0, 0.5), Vector3(0.05, 0, 0)
 ELLIPSE_SCALE, PREDICTION_ELLIPSE_SCALE = Vector3(0.03, 0, 0), Vector3(0.015, 0, 0)
-AREA, AREA_SCALE = 'ignored_area', Vector3(0.06, 0, 0)
+AREA, VIEW = 'ignored_area', 'field_of_view'
+OUTLINE_SCALES = {AREA: Vector3(0.06, 0, 0), VIEW: Vector3(0.03, 0, 0)}
 UPRIGHT = Quaternion(0, 0, 0, 1)
 CHI2_95 = 5.991  # 95 % quantile of chi squared with 2 degrees of freedom: squared semi-axes in standard deviations
 CIRCLE = np.array([(np.cos(angle), np.sin(angle)) for angle in np.linspace(0, 2 * np.pi, 25)])
@@ -46,10 +48,9 @@ class MarkerParams(NamedTuple):
         NAMESPACES[:-1], 'Kinds of markers, each in a namespace of its own that RViz switches on and off. cylinder; '
         'id: the track ID, with the class of objects other than people, followed by a question mark while the object '
         'is not detected; velocity: red, to the position in 1 s; prediction: green, to the last predicted position; '
-        'history: the path walked, fading; '
-        'ellipse: contains the position with a probability of 95 %; ignored_area: where no track starts '
-        '(ignored_areas); prediction_ellipse: the same at each half second '
-        'ahead.', choices=NAMESPACES, live=True)
+        'history: the path walked, fading; ellipse: contains the position with a probability of 95 %; ignored_area: '
+        'where no track starts (ignored_areas); field_of_view: of the camera, on the floor; prediction_ellipse: the '
+        'ellipse at each half second ahead.', choices=NAMESPACES, live=True)
     marker_color: str = Param(
         'id', 'Colour of cylinders, history and ellipses. id: one of ten colours by track ID, which shows ID '
         'switches; status: blue for visible, amber for occluded, grey for out of view; thesis: blue. Undetected '
@@ -83,14 +84,15 @@ class MarkerWriter(object):
     A marker is updated while its track exists, and deleted when the track ends. Without new messages RViz removes it
     after its lifetime (0: never).
 
-    Attribute `areas_m`: polygons (n, 2) in the fixed frame in which no track starts.
+    Attributes, in the fixed frame: `areas_m`, polygons (n, 2) in which no track starts, and `views_m`, those that the
+    cameras see.
     """
 
     def __init__(self, params=MarkerParams()):
         self._drawn = set()  # (namespace, id)
         self._histories = {}  # by track ID: an anchor (3,), and the path relative to it, [(stamp_ns, Point)]
         self._outlines = {}  # of the ellipses, by track ID
-        self.areas_m = ()
+        self.areas_m = self.views_m = ()
         self.reconfigure(params)
 
     def reconfigure(self, params):
@@ -117,20 +119,23 @@ class MarkerWriter(object):
                     markers.append(Marker(header, namespace, track.id, look.type, Marker.ADD, look.pose or pose,
                                           look.scale, look.color, self._lifetime, False, look.points, look.colors,
                                           look.text, '', False))
-        if AREA in self._params.marker_namespaces:
-            markers += [self._area(number, polygon, header) for number, polygon in enumerate(self.areas_m)]
+        for namespace, polygons_m in ((AREA, self.areas_m), (VIEW, self.views_m)):
+            if namespace in self._params.marker_namespaces:
+                markers += [self._outline(namespace, number, polygon_m, header)
+                            for number, polygon_m in enumerate(polygons_m)]
         drawn = {(marker.ns, marker.id) for marker in markers}
         markers += [Marker(header=header, ns=namespace, id=track_id, action=Marker.DELETE)
                     for namespace, track_id in sorted(self._drawn - drawn)]
         self._drawn = drawn
         return MarkerArray(markers=markers)
 
-    def _area(self, number, polygon, header):
+    def _outline(self, namespace, number, polygon, header):
         """Closed outline of a polygon on the floor."""
         anchor_m = np.append(polygon[0], FLOOR_OFFSET_M)
         corners = [_point(x, y, 0.0) for x, y in (np.vstack((polygon, polygon[:1])) - polygon[0]).tolist()]
-        return Marker(header=header, ns=AREA, id=number, type=Marker.LINE_STRIP, action=Marker.ADD,
-                      pose=_pose(anchor_m), scale=AREA_SCALE, color=_color(GREY, 0.9), lifetime=self._lifetime,
+        return Marker(header=header, ns=namespace, id=number, type=Marker.LINE_STRIP, action=Marker.ADD,
+                      pose=_pose(anchor_m), scale=OUTLINE_SCALES[namespace], color=_color(GREY, 0.9),
+                      lifetime=self._lifetime,
                       points=corners)
 
     def _extended_history(self, track, now_ns):
