@@ -219,8 +219,19 @@ class Document(object):
 
 
 def _existing(measurement, folder):
-    """The measurement, with a problem if one of its files does not exist."""
+    """The measurement, with a problem if one of its files does not exist, or is a PNG whose end is missing."""
     missing = [os.path.relpath(path, folder) for path in (measurement.color_path, measurement.depth_path)
                if path and not os.path.exists(path)]
-    problem = 'there is no file %s' % ' and no file '.join(missing) if missing else measurement.problem
-    return measurement._replace(problem=problem)
+    if missing:
+        return measurement._replace(problem='there is no file %s' % ' and no file '.join(missing))
+    truncated = [os.path.relpath(path, folder) for path in (measurement.color_path, measurement.depth_path)
+                 if path and path.endswith('.png') and not _has_end_of_png(path)]
+    return measurement._replace(problem='the end of %s is missing' % ' and of '.join(truncated)) if truncated else (
+        measurement)
+
+
+def _has_end_of_png(path):
+    """Whether a PNG file ends with its last chunk, IEND."""
+    with open(path, 'rb') as stream:
+        stream.seek(-min(os.path.getsize(path), 8), os.SEEK_END)
+        return stream.read(4) == b'IEND'

@@ -1,9 +1,10 @@
 """List of measurements with their states: a Qt model, and a view."""
 from ros_3d_bb.sessions.session_reader import ANNOTATED, NEW, NOBODY, REJECTED
+from ros_3d_bb.sessions.session_writer import ID_FORMAT
 from ros_3d_bb_annotator.lengths import number_text
 from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets, Signal
 
-COLUMNS = ('ID', 'Label', 'State', 'X', 'Z', 'Error')
+COLUMNS = ('ID', 'X', 'Z', 'Error', 'State', 'Label')  # the first ones are visible in a small window
 NUMBERS = 'X', 'Z', 'Error'
 IMPLAUSIBLE, INVALID = 'implausible', 'invalid'
 # Okabe and Ito's colours, which are different for all kinds of colour vision
@@ -72,8 +73,10 @@ class MeasurementModel(QtCore.QAbstractTableModel):
         measurement, errors_m = self._document.measurements[row], self._document.known_errors(row)
         x_m, _y_m, z_m = measurement.truth_m or (None, None, None)
         values_m = (x_m, True), (z_m, False), (None if errors_m is None else errors_m[2], False)
-        return [measurement.id, measurement.label, self.state_of(row)] + [
-            '' if value_m is None else number_text(value_m, signed) for value_m, signed in values_m]
+        stored = ID_FORMAT.match(measurement.id)  # its number is unique, and the rest, a stamp, is wide
+        return [stored.group(1) if stored else measurement.id] + [
+            '' if value_m is None else number_text(value_m, signed) for value_m, signed in values_m] + [
+            self.state_of(row), measurement.label]
 
 
 class MeasurementList(QtWidgets.QTableView):
@@ -96,8 +99,11 @@ class MeasurementList(QtWidgets.QTableView):
         self.verticalHeader().setSectionResizeMode(QtWidgets.QHeaderView.Fixed)  # no sizes of invisible rows
         self.verticalHeader().setDefaultSectionSize(self.fontMetrics().height() + 6)
         header, metrics = self.horizontalHeader(), self.fontMetrics()
-        for column, text in enumerate(('00000_00', 'Label', 'nobody found', '\u22120.000', '00.000', 'Error')):
-            header.resizeSection(column, metrics.boundingRect(text).width() + 12)
+        widths = [metrics.boundingRect(text).width() + 12 for text in (
+            '00000_00', '\u22120000', '00000', 'Error', 'nobody found', 'Label')]
+        for column, width in enumerate(widths):
+            header.resizeSection(column, width)
+        self.setMinimumWidth(sum(widths[:4]) + self.style().pixelMetric(QtWidgets.QStyle.PM_ScrollBarExtent) + 4)
         self.selectionModel().currentChanged.connect(self._on_current)
 
     @property

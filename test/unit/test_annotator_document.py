@@ -149,6 +149,14 @@ def test_a_missing_image_is_named_and_other_measurements_can_be_annotated(folder
     assert list(problems_of(document)) == []
 
 
+@pytest.mark.parametrize('share', [0, 0.5, 0.99])
+def test_a_truncated_image_is_named(folder, share):
+    path = os.path.join(folder, 'depth', 'm1.png')
+    os.truncate(path, int(share * os.path.getsize(path)))
+    assert [measurement.problem for measurement in Document(folder).measurements] == [
+        None, 'the end of depth/m1.png is missing', None, None]
+
+
 @pytest.mark.parametrize('break_it,problem', [
     (lambda entry: entry.pop('id'), "'id' is missing"), (lambda entry: entry.update(person=2), 'person is 2'),
     (lambda entry: entry['detections'][0].update(box=[1, 2, 3]), '[1, 2, 3]'),

@@ -201,6 +201,21 @@ def test_a_measurement_after_a_deleted_one_is_shown_with_its_image(fast_refresh,
     assert drive.window.pane.images.panels[1].image != shown
 
 
+def test_numbers_and_errors_of_measurements_are_visible_in_a_small_window(window_on, folder):
+    """The IDs are those of the viewer: their numbers differ, and the stamps behind them begin and end alike."""
+    change_json(folder, lambda content: [entry.update(id='%05d_1616161616_%09d' % (number, 500000000 + number))
+                                         for number, entry in enumerate(content['frames'])])
+    drive = window_on(folder)
+    drive.window.resize(800, 600)
+    drive.settle()
+    table = drive.window.list
+    shown = [table.model().headerData(column, Qt.Horizontal) for column in range(table.model().columnCount())
+             if table.columnViewportPosition(column) + table.columnWidth(column) <= table.viewport().width()]
+    assert {'ID', 'X', 'Z', 'Error'} <= set(shown)
+    assert [table.model().index(row, 0).data() for row in range(4)] == ['00000', '00001', '00002', '00003']
+    assert table.fontMetrics().boundingRect('00000').width() < table.columnWidth(0)
+
+
 def test_an_invalid_session_gives_a_message(window_on, tmp_path):
     (tmp_path / 'frames.json').write_text('[]')
     was_opened = []

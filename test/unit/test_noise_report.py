@@ -22,7 +22,8 @@ from support.small_session import change_json
 from support.synthetic_session import write_synthetic_session
 
 pytestmark = pytest.mark.slow  # each model is fitted many times
-FIGURES = ['layout', 'z_error', 'z_variance', 'x_error', 'x_variance', 'sigma', 'z_distribution', 'x_distribution']
+FIGURES = ['layout', 'z_error', 'z_rms', 'z_variance', 'x_error', 'x_variance', 'sigma', 'z_distribution',
+           'x_distribution']
 
 
 def run(monkeypatch, *arguments):
@@ -65,6 +66,9 @@ def test_the_report_contains_all_figures(out):
         assert image.shape[0] > 300 and image.std() > 5
     assert 'D435i &lt;&amp;&gt;' in page
     text = re.sub('base64,[^"]*', '', page)
+    style = text[:text.index('</style>')]
+    assert set(re.findall(r'counter-increment: (\w+)', style)) == set(re.search(
+        r'body {[^}]*counter-reset: ([\w ]+);', style).group(1).split())  # otherwise each caption is the first one
     assert '>None' not in text and 'nan' not in text and 'src="d' in text and 'href' not in text
 
 

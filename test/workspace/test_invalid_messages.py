@@ -121,6 +121,18 @@ def test_edges_far_outside_the_image_are_clipped(monkeypatch):
     assert corners == [-4, 5, 68, 20, 3, 4, 9, 52]
 
 
+def test_labels_of_neighbours_do_not_overlap(monkeypatch):
+    filled = []
+    monkeypatch.setattr('cv2.rectangle', lambda _image, start, end, _color, thickness: (
+        filled.append(start + end) if thickness < 0 else None))
+    boxes_px = np.array([[10, 40, 60, 200], [40, 45, 90, 200], [20, 40, 70, 200], [300, 40, 360, 200]])
+    image_overlay.draw_boxes(np.zeros((480, 640, 3), np.uint8), boxes_px, ['person 2.10 m'] * 4)
+    for number, (left, top, right, bottom) in enumerate(filled):
+        for other_left, other_top, other_right, other_bottom in filled[:number]:
+            assert left >= other_right or right <= other_left or top >= other_bottom or bottom <= other_top
+    assert filled[3][3] == 40
+
+
 def test_boxes_are_processed_even_if_the_colour_image_is_invalid():
     """Two arrays of boxes wait for one depth image."""
     with masterless() as connections:

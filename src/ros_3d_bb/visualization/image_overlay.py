@@ -11,19 +11,26 @@ DEPTH_RANGE_M = 6.0  # default of the far end of the colours of depth
 
 
 def draw_boxes(image, boxes, labels):
-    """Draw 2D boxes (n, 4) with labels, which may be empty. Returns the image."""
+    """Draw 2D boxes (n, 4) with labels, which may be empty, and are moved where they overlap. Returns the image."""
     import cv2
     height, width = image.shape[:2]
     # OpenCV also iterates over the parts of edges outside the image: an edge of 2^31 pixels takes a tenth of a second.
     clipped = np.clip(np.reshape(boxes, (-1, 4)), -OUTSIDE_PX, [width + OUTSIDE_PX, height + OUTSIDE_PX] * 2)
-    for box, label in zip(np.rint(clipped).astype(int).tolist(), labels):
+    corners, taken = np.rint(clipped).astype(int).tolist(), []
+    for box in corners:
         cv2.rectangle(image, tuple(box[:2]), tuple(box[2:]), BOX_COLOR, 2)
+    for box, label in zip(corners, labels):
         if not label:
             continue
         (text_width, text_height), baseline = cv2.getTextSize(label, cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1)
-        top = max(box[1], text_height + baseline)  # inside the image, even if the box starts above it
-        cv2.rectangle(image, (box[0], top - text_height - baseline), (box[0] + text_width, top), BOX_COLOR, cv2.FILLED)
-        cv2.putText(image, label, (box[0], top - baseline // 2 - 1), cv2.FONT_HERSHEY_SIMPLEX, 0.5, TEXT_COLOR, 1,
+        left, right, line = box[0], box[0] + text_width, text_height + baseline
+        bottom = max(box[1], line)  # inside the image, even if the box starts above it
+        for other_left, other_right, other_bottom in sorted(taken, key=lambda other: other[2]):
+            if left < other_right and right > other_left and abs(bottom - other_bottom) < line:
+                bottom = other_bottom + line
+        taken.append((left, right, bottom))
+        cv2.rectangle(image, (left, bottom - line), (right, bottom), BOX_COLOR, cv2.FILLED)
+        cv2.putText(image, label, (left, bottom - baseline // 2 - 1), cv2.FONT_HERSHEY_SIMPLEX, 0.5, TEXT_COLOR, 1,
                     cv2.LINE_AA)
     return image
 

@@ -7,7 +7,8 @@ import mimetypes
 PAGE = '''<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1"><title>{title}</title><style>
-body {{ font: 16px/1.5 sans-serif; max-width: 54em; margin: 2em auto; padding: 0 1em; color: #222; }}
+body {{ font: 16px/1.5 sans-serif; max-width: 54em; margin: 2em auto; padding: 0 1em; color: #222;
+       counter-reset: figure table; }}
 table {{ display: block; overflow-x: auto; border-collapse: collapse; margin: 0.3em 0 1.2em; font-size: 0.9em; }}
 td, th {{ padding: 0.15em 0.8em; text-align: right; vertical-align: top; }}
 th {{ border-bottom: 1px solid #888; }} td:first-child, th:first-child {{ text-align: left; padding-left: 0; }}

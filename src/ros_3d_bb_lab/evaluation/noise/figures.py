@@ -9,6 +9,9 @@ import matplotlib.pyplot as plt  # noqa: E402
 SIZE_IN, DPI = (7.2, 4.2), 110
 COLUMNS = 3
 MANY_CLUSTERS = 12
+# Smallest RMS error of the depth of a plane: z² s / (f b), with the subpixel accuracy s and the baseline b of a D435
+# (Intel's values, thesis 5.2). The curve is fitted from 1.5 m on, as in the thesis.
+SUBPIXEL_PX, BASELINE_M, QUADRATIC_FROM_M = 0.08, 0.050, 1.5
 MEASURED, FITTED = '#0072b2', '#d55e00'  # different for all colour vision
 
 
@@ -56,6 +59,24 @@ def error_by_truth(path, axis, name):
     axes.plot(line_m, np.polyval(axis.poly, line_m), color=FITTED,
               label='f(%s) = %s' % (name.lower(), axis.poly_text(name.lower())))
     _finish(figure, axes, path, 'true %s [m]' % name, '%s error [m]' % name)
+
+
+def depth_rms(path, axis, camera):
+    """RMS error of Z by true Z, and a quadratic curve, as Fig. 5.2 of the thesis; with the theoretical error of a D435
+    unless the camera is None."""
+    truth_m, rms_m = np.array([(cluster.truth_m, cluster.rms_m) for cluster in axis.clusters]).T
+    line_m, far = np.linspace(truth_m.min(), truth_m.max(), 100), truth_m >= QUADRATIC_FROM_M
+    figure, axes = plt.subplots(figsize=SIZE_IN)
+    axes.plot(truth_m, rms_m, 'o', color=MEASURED, label='measured')
+    if far.any():
+        factor = (rms_m[far] * truth_m[far] ** 2).sum() / (truth_m[far] ** 4).sum()
+        fitted_m = line_m[line_m >= QUADRATIC_FROM_M]
+        axes.plot(fitted_m, factor * fitted_m ** 2, color=FITTED, label='fit: %.4f z²' % factor)
+    if camera is not None:
+        axes.plot(line_m, SUBPIXEL_PX / (camera.fx * BASELINE_M) * line_m ** 2, '--', color='0.3',
+                  label='theory: plane before a D435 (%g pixels, %g mm)' % (SUBPIXEL_PX, 1000 * BASELINE_M))
+    axes.set_ylim(bottom=0)
+    _finish(figure, axes, path, 'true Z [m]', 'RMS of the Z error [m]')
 
 
 def variances(path, axis, name):

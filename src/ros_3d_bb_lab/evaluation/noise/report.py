@@ -7,7 +7,7 @@ from ros_3d_bb.estimation.error_model import write_error_model
 from ros_3d_bb.sessions.plausibility import position_text
 from ros_3d_bb_lab.evaluation.html_report import figure, heading, html_report, paragraph, table
 from ros_3d_bb_lab.evaluation.noise.analysis import LEAST_IN_CLUSTER, summary_of
-from ros_3d_bb_lab.evaluation.noise.figures import error_by_truth, histograms, layout, sigmas, variances
+from ros_3d_bb_lab.evaluation.noise.figures import depth_rms, error_by_truth, histograms, layout, sigmas, variances
 from ros_3d_bb_lab.evaluation.noise.tables import LEAST_TO_TEST
 
 SIGNIFICANCE = 0.05  # of the normality test
@@ -129,6 +129,8 @@ def _z(analysis, drawn):
                       % analysis.z.poly_text('z')),
             drawn('z_error.png', 'error in Z by true Z, and f(z)', error_by_truth, analysis.z, 'Z'),
             _cluster_table(analysis.z, 'Z', 'errors in Z by true Z'),
+            drawn('z_rms.png', 'RMS error in Z by true Z, measured and theoretical (as Fig. 5.2 of the thesis)',
+                  depth_rms, analysis.z, analysis.inputs.z.camera),
             drawn('z_variance.png', 'variance of the error in Z by true Z', variances, analysis.z, 'Z')]
 
 
