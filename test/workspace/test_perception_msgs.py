@@ -190,14 +190,6 @@ def test_people_are_upright_for_any_mount_of_the_camera(roll_deg, size_m, edge):
     assert detection.truncated_edges == (False, True, False, False)
 
 
-@pytest.mark.parametrize('edge,y_m', [('BOTTOM', 0.35), ('TOP', -0.35)])
-def test_a_truncated_person_in_portrait_has_the_usual_width(edge, y_m):
-    """The estimator has extended the box beyond the border to 1.7 m, from y = -+0.5 m on."""
-    detection = detection_of(box_of(1.7, 1.7, y_m=y_m, edge=edge), 90)  # the left edge of the image is up
-    np.testing.assert_allclose(detection.size_m, (0.46, 0.46, 1.7))
-    np.testing.assert_allclose(abs(detection.position_m[1]), 0.27)
-
-
 def test_box_orientation_is_stable_for_a_camera_pointing_down():
     random = np.random.RandomState(0)
     for _ in range(100):

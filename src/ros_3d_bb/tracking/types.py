@@ -57,7 +57,7 @@ def detections_from_boxes(boxes, fixed_from_camera, classes=ObjectClasses()):
     for index, box in boxes.items():
         (x, y, z), (width_m, height_m) = map(float, box.center_m), map(float, box.size_m[:2])
         if turns % 2:
-            (x, y, z), (height_m, width_m) = _completed_in_portrait(box, classes.of(box.label))
+            width_m, height_m = height_m, width_m
         position_m = tuple([of_x * x + of_y * y + of_z * z + shift_m for of_x, of_y, of_z, shift_m in rows])
         covariance_m2 = box.covariance_m2
         if covariance_m2 is not None:
@@ -67,23 +67,6 @@ def detections_from_boxes(boxes, fixed_from_camera, classes=ObjectClasses()):
             box.truncated_edges[-turns:] + box.truncated_edges[:-turns], box.support or 1.0,  # 0: unknown
             classes.standard_name(box.label), box.score, index))
     return detections
-
-
-def _completed_in_portrait(box, kind):
-    """Centre of a box and its extents along the rows and the columns of an image of a camera in portrait, lists.
-
-    The estimator completes a truncated object as if it stood upright in the image: to the usual width along the rows
-    and to the usual height along the columns. In portrait, the two are swapped. The visible end stays in place.
-    """
-    center_m, extents_m, cut = list(map(float, box.center_m)), list(map(float, box.size_m))[:2], box.truncated_edges
-    was_completed = np.isclose(extents_m[1], kind.height)
-    completed_m = max(extents_m[0], kind.height), kind.width if was_completed else extents_m[1]
-    for axis, (cut_low, cut_high) in enumerate(zip(cut[:2], cut[2:])):
-        if cut_low != cut_high:
-            missing_m = completed_m[axis] - extents_m[axis]
-            center_m[axis] += missing_m / 2 if cut_high else -missing_m / 2
-            extents_m[axis] = completed_m[axis]
-    return center_m, extents_m
 
 
 class CameraView(NamedTuple):
