@@ -55,12 +55,14 @@ WALKING_SHARE, WALKING_M2PS2 = 1 / 3.0, 0.36
 # Places among the numbers of a published track, see `_numbers_of`: of x, y, z, their velocities, the velocity of the
 # prediction, the extents, and the share of `manoeuvre_acceleration`; of the covariance of the first six, and of the two
 # terms of the covariances of x, y, z that are multiplied by the powers 0, 1, 2 of the time of a prediction.
-POSITION, VELOCITY, EXPECTED, SIZE, POSITION_VARIANCES = [0, 1, 14], [2, 3, 16], [17, 18, 16], slice(19, 22), [4, 8]
-MANOEUVRING = 22
-COVARIANCE = np.array([[4, 5, 16, 6, 7, 16], [5, 8, 16, 9, 10, 16], [16, 16, 15, 16, 16, 16],
-                       [6, 9, 16, 11, 12, 16], [7, 10, 16, 12, 13, 16], [16] * 6])
-_CROSS, _NOTHING = COVARIANCE[:3, 3:], np.full((3, 3), 16)
-AHEAD = np.reshape((COVARIANCE[:3, :3], _CROSS, COVARIANCE[3:, 3:], _NOTHING, _CROSS.T, _NOTHING), (2, 3, 9))
+POSITION, VELOCITY, EXPECTED, SIZE, MANOEUVRING = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), 12
+XX, XY, XU, XV, YY, YU, YV, UU, UV, VV, ZZ = range(13, 24)
+ZERO = 5  # the vertical velocity
+COVARIANCE = np.array([[XX, XY, ZERO, XU, XV, ZERO], [XY, YY, ZERO, YU, YV, ZERO], [ZERO, ZERO, ZZ, ZERO, ZERO, ZERO],
+                       [XU, YU, ZERO, UU, UV, ZERO], [XV, YV, ZERO, UV, VV, ZERO], [ZERO] * 6])
+_CROSS, _NOTHING = COVARIANCE[:3, 3:], np.full((3, 3), ZERO)
+AHEAD = COVARIANCE[:3, :3], _CROSS, COVARIANCE[3:, 3:], _NOTHING, _CROSS.T, _NOTHING
+COVARIANCES = np.concatenate([COVARIANCE.ravel()] + [each.ravel() for each in AHEAD])  # at once, as indexing is slow
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])  # a covariance (3, 3) of 1 along x and y
 
 
@@ -336,17 +338,18 @@ def published(tracks, params):
     if not tracks:
         return []
     numbers = np.array([_numbers_of(track, params.standing_speed ** 2 + LEAST_SPEED2) for track in tracks])
-    numbers[:, POSITION_VARIANCES] += params.position_bias ** 2
+    numbers[:, XX:YY + 1:YY - XX] += params.position_bias ** 2
     times_s, powers, spread = _times(params.prediction_time, params.prediction_step)
     densities = params.prediction_acceleration + params.manoeuvre_acceleration * numbers[:, MANOEUVRING]
     positions_m, velocities_mps, sizes_m = numbers[:, POSITION], numbers[:, VELOCITY], numbers[:, SIZE]
     predictions_m = positions_m[:, None] + times_s[:, None] * numbers[:, None, EXPECTED]
-    predictions_m2 = powers @ (numbers[:, AHEAD[0]] + numbers[:, AHEAD[1]]) + densities[:, None, None] * spread
+    covariances, first, second = np.split(numbers.take(COVARIANCES, axis=1), (36, 63), axis=1)
+    predictions_m2 = powers @ (first + second).reshape(-1, 3, 9) + densities[:, None, None] * spread
     return [TrackedObject(track.id, position_m, size_m, velocity_mps, velocity_mps, track.status, track.is_moving,
                           track.first_ns, track.last_ns, prediction_m, params.prediction_step, covariance,
                           prediction_m2, track.kind.label, track.score, track.detection)
             for track, position_m, size_m, velocity_mps, prediction_m, covariance, prediction_m2
-            in zip(tracks, positions_m, sizes_m, velocities_mps, predictions_m, numbers[:, COVARIANCE],
+            in zip(tracks, positions_m, sizes_m, velocities_mps, predictions_m, covariances.reshape(-1, 6, 6),
                    predictions_m2.reshape(len(tracks), -1, 3, 3))]
 
 
@@ -362,7 +365,8 @@ def _numbers_of(track, standing2):
     share = speed2 / (speed2 + standing2)
     manoeuvring = change2 / (change2 + MANOEUVRE * (state.uu + state.vv) / 2 + LEAST_SPEED2)  # its probability
     manoeuvring *= WALKING_SHARE + (1 - WALKING_SHARE) * WALKING_M2PS2 / (WALKING_M2PS2 + speed2)
-    return state + (track.z_m, track.z_m2, 0.0, share * u, share * v) + track.size_m + (manoeuvring,)
+    x, y, vx, vy, *variances = state
+    return (x, y, track.z_m, vx, vy, 0.0, share * u, share * v, 0.0, *track.size_m, manoeuvring, *variances, track.z_m2)
 
 
 @functools.lru_cache(maxsize=16)
