@@ -1,3 +1,5 @@
+from unittest import mock
+
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
@@ -7,9 +9,11 @@ from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.object_classes import PERSON_CLASS
 from ros_3d_bb.estimation.box3d import ImageGeometry, truncated_edges
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimate_foreground, estimator_named
+from ros_3d_bb.estimation.depth_samples import nearest_dominant_layer
 from ros_3d_bb.sessions.session_reader import read_depth, read_session
 
 CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
+LAYER = 'ros_3d_bb.estimation.depth_samples.nearest_dominant_layer'
 
 
 def of(camera):
@@ -108,6 +112,22 @@ def test_occluders_of_occluders_mask_pixels():
     rects = [(30, 4, 54, 42), (18, 4, 42, 43), (6, 4, 30, 44)]
     boxes = estimate_foreground(depth, rects, of(CAMERA), [PERSON_CLASS] * 3)
     np.testing.assert_allclose([box.center_m[2] - PERSON_CLASS.axis for box in boxes], [4, 3, 2], atol=1e-9)
+
+
+def test_the_work_for_a_box_does_not_grow_with_the_number_of_boxes_that_overlap():
+    """Of the same four people; the work is mainly that to determine layers."""
+    camera, random = Camera(640, 480, 600.0, 600.0, 319.5, 239.5), np.random.RandomState(0)
+    depth_mm = np.full((480, 640), 6000, np.uint16)
+    for number in range(4):
+        depth_mm[60:460, 80 + 130 * number:180 + 130 * number] = 1500 + 500 * number
+    layers_each = {}
+    for count in (20, 100):
+        middle, half, top = (random.randint(*limits, count) for limits in ((80, 560), (15, 40), (60, 300)))
+        rects_px = list(zip(middle - half, top, middle + half, [460] * count))
+        with mock.patch(LAYER, wraps=nearest_dominant_layer) as determined:
+            estimate_boxes(DepthImage(depth_mm, 0.001), rects_px, camera, estimator_named('foreground'))
+        layers_each[count] = determined.call_count / count
+    assert layers_each[100] <= 1.5 * layers_each[20], layers_each
 
 
 def test_depths_beyond_any_camera_are_ignored():

@@ -155,12 +155,15 @@ class RectSamples(object):
         return self._layer_in(beside_mm)
 
     def mask(self, rect_px, limit_mm):
-        """Mask the samples that are in a rectangle and not farther than `limit_mm`. Returns whether there are any."""
+        """Mask the samples that are in a rectangle and not farther than `limit_mm`. Returns whether this changes the
+        layer: not if all of them are nearer than its body, because what is nearer was not dominant before."""
         part = self._part(self._ahead_mm, rect_px)
         masked = part <= limit_mm
         if not np.count_nonzero(masked):
             return False
         part[masked] = UNKNOWN_MM
+        if self._layer is not None and limit_mm < self._layer.trunk_mm - BODY_HALF_DEPTH_MM:
+            return False
         self._layer = None
         return True
 
@@ -185,7 +188,7 @@ class RectSamples(object):
 
     def share(self, on_body):
         """Share of the weight of all samples, with depth or not, that the given samples have."""
-        return self._weights.dot(on_body) / self._weights.sum()
+        return self._weights.dot(on_body) / np.add.reduce(self._weights)
 
     def fill_sides(self, on_body):
         """Whether the given samples fill both sides of the rectangle; one is enough if the other hardly has depth."""
@@ -331,14 +334,15 @@ def _start_of_layer(distances_mm, weights, nearest_mm, farthest_mm, outline):
     """Least distance in the nearest dominant layer; it may be less than 0."""
     bins = (farthest_mm - nearest_mm) // BIN_MM + 1 + LAYER_BINS
     # Differences are modulo 2 ** 16: unknown distances are in the first bins, or after the last one.
-    numbers = (distances_mm - np.uint16((nearest_mm - BIN_MM * _EMPTY_BINS) % 2 ** 16)) // np.uint16(BIN_MM)
+    numbers = distances_mm - np.uint16((nearest_mm - BIN_MM * _EMPTY_BINS) % 2 ** 16)
+    numbers //= np.uint16(BIN_MM)
     layers, total = _layer_sums(numbers, weights, bins)
     inside = layers
     if len(outline) >= LEAST_OUTLINE:
         around, known = _layer_sums(numbers[outline], None, bins)
         if known >= LEAST_OUTLINE:
             inside = np.maximum(layers - _SURELY[around] * (total / known), LEAST_INSIDE * layers)
-    first = int((inside >= FIRST_LAYER_SHARE * inside.max()).argmax())
+    first = int((inside >= FIRST_LAYER_SHARE * inside[inside.argmax()]).argmax())  # faster than max
     best = first + int(layers[first:first + LAYER_BINS].argmax())
     return nearest_mm + BIN_MM * (best - LAYER_BINS // 2)
 
@@ -364,8 +368,10 @@ def middle_of_trunk(positions, middle_m):
     """
     for _step in range(TRUNK_STEPS):
         from_middle_m = positions - middle_m
-        weights = np.maximum(TRUNK_HALF_WIDTH_M ** 2 - from_middle_m * from_middle_m, 0)
-        total = weights.sum()
+        weights = from_middle_m * from_middle_m
+        np.subtract(TRUNK_HALF_WIDTH_M ** 2, weights, out=weights)
+        np.maximum(weights, 0, out=weights)
+        total = np.add.reduce(weights)  # faster than sum
         if not total:
             break
         middle_m += weights.dot(from_middle_m) / total

@@ -11,8 +11,9 @@ CLEARLY_LOWER = 0.02  # share of the image height: nearer people stand lower in 
 LEAST_BESIDE = 0.25  # minimum share of a rectangle beside another one that shows a layer of its own
 CONTAINED = 0.8  # minimum share of a second rectangle of an object in the first one
 # For speed, and more than in a crowd: of more rectangles, those that few others occlude are foremost, too, and a part
-# of the overlaps is ignored; so many layers of rectangles beside each other are determined at once.
-MANY, MOST_TIES = 200, 256
+# of the overlaps is ignored; so many layers of rectangles beside each other are determined in one image, and for each
+# of its rectangles.
+MANY, MOST_TIES, TIES_EACH = 50, 32, 1
 
 
 class Overlaps(object):
@@ -35,7 +36,9 @@ class Overlaps(object):
         self._changed = set(usable)  # since the layer was determined
         self._shared_px = _shared_areas(usable, rects_px)  # with each pending rectangle that overlaps another one
         self._nearer = collections.defaultdict(set)  # pending rectangles of nearer objects that overlap it
-        self._layers_m, self._beside_m, self._ties = {}, {}, 0
+        self._layers_m, self._beside_m = {}, {}
+        self._determined_m = {}  # layers beside others, of the samples as they are: {number: {other: layer or None}}
+        self._ties = MOST_TIES + TIES_EACH * len(self.pending)  # that may still be determined
         self.repeats = set()  # may be of the object of a larger rectangle
 
     def take_foremost(self):
@@ -72,7 +75,7 @@ class Overlaps(object):
                 self._remove(number)
             else:
                 self._layers_m[number] = layer.trunk_mm / 1000
-        self._ties = 0
+                self._determined_m[number] = {}
         for number in self.pending.intersection(changed):
             self._changed.remove(number)
             for other in self._shared_px[number]:
@@ -97,11 +100,13 @@ class Overlaps(object):
     def _determine_beside(self, number, other):
         """Determine the layer of a rectangle beside another one, metres; its layer if there is none beside it."""
         is_beside = self._shared_px[number][other] <= (1 - LEAST_BESIDE) * self._areas_px[number]
-        if is_beside and self._ties < MOST_TIES:
-            self._ties += 1
+        determined_m = self._determined_m[number]
+        if is_beside and other not in determined_m and self._ties:
+            self._ties -= 1
             layer = self._samples[number].layer_beside(self._rects_px[other])
-            if layer is not None:
-                self._beside_m[number, other] = layer.trunk_mm / 1000
+            determined_m[other] = layer and layer.trunk_mm / 1000
+        if determined_m.get(other) is not None:
+            self._beside_m[number, other] = determined_m[other]
         return self._layer_beside(number, other)
 
     def _layer_beside(self, number, other):
