@@ -2,9 +2,11 @@
 
 The times are from the depth image and the 2D boxes to tracks with predictions, without messages and waiting. Estimation
 computes 3D boxes in the camera's frame; tracking transforms them to the fixed frame, tracks them and predicts. The
-people of a measurement session are placed side by side in one wide depth image. Both algorithms process the same image
-and boxes, and take turns in being first, so that other load on the machine and cold caches affect both equally and
-their ratio remains valid.
+people of a measurement session are placed side by side in one wide depth image. All algorithms process the same image
+and boxes, and take turns in being first, so that other load on the machine and cold caches affect all equally and their
+ratios remain valid.
+
+The algorithms of the thesis are those of its published code (`--published`), and as one would write them today.
 """
 import functools
 import itertools
@@ -25,6 +27,7 @@ from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import CameraView, Detection, detections_from_boxes
 from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker
+from ros_3d_bb_lab.evaluation.baselines.published_code import PublishedCode, load_published
 from ros_3d_bb_lab.evaluation.defaults import data_folder, default_weights, describe_machine, in_range
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb_lab.evaluation.text_table import line_of, table_of
@@ -34,7 +37,7 @@ WARM_UPS = 10  # images that are not timed, until tracks are confirmed and cache
 PERIOD_NS = NS // 30
 FIXED_FROM_CAMERA = transform_from((0.0, 0.0, 1.0), OPTICAL_ROTATION)
 AHEAD_S = 2.0  # horizon of the thesis' prediction
-ALGORITHMS, STAGES = ('ours', 'thesis'), ('estimation', 'tracking', 'both')
+STAGES = 'estimation', 'tracking', 'both'
 DETECTOR_IMAGES, DETECTOR_WARM_UPS = 40, 2
 COVERED = 0.2  # share of a box that its neighbour covers
 JITTER_PX = 2  # maximum change of the edges of a box between images
@@ -106,7 +109,7 @@ class Ours(object):
 
 
 class Theirs(object):
-    """Algorithms of the thesis in the optimised version that its chapter 3 describes.
+    """Algorithms of the thesis in the optimised version that its chapter 3 describes, as one would write them today.
 
     Boxes are processed one by one, with arrays for the samples of a box (section 3.4.2) instead of the loops of the
     proof of concept, which is 2.5 times slower. Objects are processed one by one, with distances in one array (section
@@ -129,36 +132,50 @@ class Theirs(object):
                 for track in self._tracker.step(stamp_ns, detections)}
 
 
-def speed(session, counts=OBJECTS, images=60):
-    """Measure the CPU time of both algorithms in `images` images for each number of people in `counts`.
+def algorithms_for(published=None):
+    """{name: function that creates an algorithm for a Crowd}; with a folder of the published code, also of that."""
+    algorithms = {'ours': Ours, 'thesis': Theirs}
+    if published:
+        modules = load_published(published)
+        algorithms['published'] = lambda crowd: PublishedCode(modules, crowd.camera, crowd.depth.scale_m,
+                                                              FIXED_FROM_CAMERA)
+    return algorithms
 
-    Returns a dictionary: `machine`, `people`, `images`, `objects` (= `counts`); for `ours` and `thesis` the medians of
-    the times in ms by stage; and `ratio`, the median ratio of our time to that of the thesis over both stages. Raises
-    ValueError if no frame of the session has a box.
+
+def speed(session, counts=OBJECTS, images=60, published=None):
+    """Measure the CPU time of the algorithms in `images` images for each number of people in `counts`.
+
+    Returns a dictionary: `machine`, `people`, `images`, `objects` (= `counts`); for `ours`, `thesis` and, given the
+    folder of the published code, `published`, the medians of the times in ms by stage; and `ratio` and
+    `ratio_published`, the median ratio of our time to that of the others over both stages. Raises ValueError if no
+    frame of the session has a box.
     """
+    algorithms = algorithms_for(published)
     people, random = people_of(session), np.random.RandomState(0)
     if not people:
         raise ValueError('no frame of the session has a 2D box')
     random.shuffle(people)  # sessions are ordered by range
-    times_ms = _times_ms([crowd_of(people, count, session) for count in counts], images, random)
+    times_ms = _times_ms([crowd_of(people, count, session) for count in counts], list(algorithms.values()), images,
+                         random)
     result = {'machine': describe_machine(), 'people': len(people), 'images': images, 'objects': list(counts)}
-    for number, name in enumerate(ALGORITHMS):
+    both_ms = times_ms[..., STAGES.index('both')]
+    for number, name in enumerate(algorithms):
         medians_ms = np.median(times_ms[:, :, number], axis=0).T.tolist()
         result[name] = dict(zip([stage + '_ms' for stage in STAGES], medians_ms))
-    both_ms = times_ms[..., STAGES.index('both')]
-    result['ratio'] = np.median(both_ms[:, :, 0] / both_ms[:, :, 1], axis=0).tolist()
+    for number, name in enumerate(('ratio', 'ratio_published')[:len(algorithms) - 1]):
+        result[name] = np.median(both_ms[:, :, 0] / both_ms[:, :, number + 1], axis=0).tolist()
     return result
 
 
-def _times_ms(crowds, images, random):
-    """CPU times of the images, (images, crowds, algorithms, stages)."""
-    algorithms = [(Ours(crowd), Theirs(crowd)) for crowd in crowds]
-    times_ms = np.empty((images + WARM_UPS, len(crowds), len(ALGORITHMS), len(STAGES)))
+def _times_ms(crowds, kinds, images, random):
+    """CPU times of the images, (images, crowds, algorithms, stages); `kinds` create an algorithm for a crowd."""
+    algorithms = [[kind(crowd) for kind in kinds] for crowd in crowds]
+    times_ms = np.empty((images + WARM_UPS, len(crowds), len(kinds), len(STAGES)))
     for image in range(len(times_ms)):
         for number, crowd in enumerate(crowds):
             rects_px = crowd.jittered(random)
-            for turn in range(len(ALGORITHMS)):
-                which = (image + turn) % len(ALGORITHMS)
+            for turn in range(len(kinds)):
+                which = (image + turn) % len(kinds)
                 times_ms[image, number, which] = _time_ms(algorithms[number][which], crowd.depth, rects_px,
                                                           image * PERIOD_NS)
     return times_ms[WARM_UPS:]
@@ -207,13 +224,14 @@ def run(arguments):
     """Measure the times, and those of the detector if there are weights."""
     with tempfile.TemporaryDirectory() as folder:
         session = read_session(arguments.data or write_simulated_session(folder, *SIMULATED))
-        result = speed(session, OBJECTS, arguments.images)
+        result = speed(session, OBJECTS, arguments.images, arguments.published)
         colors = [read_color(frame, session.camera) for frame in session.frames[:DETECTOR_IMAGES]]
     result['data'] = arguments.data or 'simulated'
     result['detector'] = detector_speed(colors, arguments.weights) if arguments.weights else []
     print(line_of(**{key: result[key] for key in ('machine', 'people', 'data', 'images')}))
-    rows = {'%s/%s' % (name, key): values for name in ALGORITHMS for key, values in result[name].items()}
-    rows['ratio'] = result['ratio']
+    rows = {'%s/%s' % (name, key): values for name in ('ours', 'thesis', 'published') if name in result
+            for key, values in result[name].items()}
+    rows.update({name: values for name, values in result.items() if name.startswith('ratio')})
     print('\n'.join(table_of({name: dict(zip(result['objects'], values)) for name, values in rows.items()})))
     for row in result['detector']:
         print(line_of(**row))
@@ -225,5 +243,7 @@ def add_options(parser):
                         help='measurement session (default: $ROS_3D_BB_DATA/data/thesis, or simulated)')
     parser.add_argument('--weights', default=default_weights(), metavar='FILE',
                         help='YOLOv5 checkpoint; also measures the detector')
+    parser.add_argument('--published', metavar='DIR',
+                        help='checkout of github.com/Jyrijoul/ros_3d_bb, the published code; also measures it')
     parser.add_argument('--images', type=in_range(int, 1), default=60,
                         help='timed images per number of people (default: 60)')
