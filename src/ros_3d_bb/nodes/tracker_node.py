@@ -125,7 +125,8 @@ class TrackerNode(object):
 
     def _on_tracks(self, tracks, header):
         self._track_ids.reserve(tracks)
-        self._tracks_pub.publish(tracks_to_msg(tracks, header))
+        if self._tracks_pub.get_num_connections():
+            self._tracks_pub.publish(tracks_to_msg(tracks, header))
         self._diagnostics.record_latency(header.stamp)
         if self._markers_pub.get_num_connections():
             self._markers.views_m = self._stage.views_m

@@ -343,13 +343,15 @@ def published(tracks, params):
     densities = params.prediction_acceleration + params.manoeuvre_acceleration * numbers[:, MANOEUVRING]
     positions_m, velocities_mps, sizes_m = numbers[:, POSITION], numbers[:, VELOCITY], numbers[:, SIZE]
     predictions_m = positions_m[:, None] + times_s[:, None] * numbers[:, None, EXPECTED]
-    covariances, first, second = np.split(numbers.take(COVARIANCES, axis=1), (36, 63), axis=1)
-    predictions_m2 = powers @ (first + second).reshape(-1, 3, 9) + densities[:, None, None] * spread
+    covariances = numbers.take(COVARIANCES, axis=1)
+    ahead = (covariances[:, 36:63] + covariances[:, 63:]).reshape(-1, 3, 9)
+    predictions_m2 = powers @ ahead + densities[:, None, None] * spread
     return [TrackedObject(track.id, position_m, size_m, velocity_mps, velocity_mps, track.status, track.is_moving,
                           track.first_ns, track.last_ns, prediction_m, params.prediction_step, covariance,
                           prediction_m2, track.kind.label, track.score, track.detection)
             for track, position_m, size_m, velocity_mps, prediction_m, covariance, prediction_m2
-            in zip(tracks, positions_m, sizes_m, velocities_mps, predictions_m, covariances.reshape(-1, 6, 6),
+            in zip(tracks, positions_m, sizes_m, velocities_mps, predictions_m,
+                   covariances[:, :36].reshape(-1, 6, 6),
                    predictions_m2.reshape(len(tracks), -1, 3, 3))]
 
 
