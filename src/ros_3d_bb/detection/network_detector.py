@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 
 from ros_3d_bb.core.params import LARGEST, Param, parameters
-from ros_3d_bb.detection.adaptive_size import SIZES
 from ros_3d_bb.detection.boxes import Detections, non_maximum_suppression
+from ros_3d_bb.detection.detection_pace import SIZES
 
 RGB, BGR = (0, 1, 2), (2, 1, 0)  # orders of the channels of an RGB image
 RESIZE_MODES = ('center', 'corner', 'stretch')
@@ -30,10 +30,13 @@ class DetectionParams(NamedTuple):
         limits=(0, 1), live=(0, 1))
     max_det: int = Param(
         100, 'Largest number of detections in an image; the best ones are kept.', limits=(1, LARGEST), live=(1, 300))
+    detection_range: float = Param(
+        8.0, 'Range up to which people are detected. It limits how far yolov5_node reduces the input of the network; '
+        'larger ranges take more CPU time.', 'm', limits=(0.5, 100), live=(1, 20))
     image_size: int = Param(
-        640, "Longer side of the network's input, rounded up to its stride (32, P6 models 64). Smaller is faster and "
-        'misses people farther away. 0: yolov5_node chooses the largest of 320, 416, 512 and 640 that keeps up with '
-        'the images; 640 elsewhere. Exports with a fixed size ignore it.', 'pixels', limits=(0, MAX_INPUT_PX),
+        0, "Longer side of the network's input, rounded up to its stride (32, P6 models 64). 0: yolov5_node chooses "
+        'the largest of 320, 384, 448, 512, 576 and 640 that keeps up with the images and suffices for '
+        'detection_range; bags and benchmarks use 640. Exports with a fixed size ignore it.', 'pixels', limits=(0, MAX_INPUT_PX),
         live=(0, 1280))
 
 

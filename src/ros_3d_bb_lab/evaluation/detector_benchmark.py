@@ -14,9 +14,10 @@ import numpy as np
 
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.depth.detector import DepthPeople
-from ros_3d_bb.detection.network_detector import DetectionParams
+from ros_3d_bb.detection.network_detector import MAX_INPUT_PX, DetectionParams
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb_lab.evaluation.defaults import data_folder, default_weights, describe_machine, in_range
+from ros_3d_bb_lab.evaluation.detection_ranges import found_at_ranges
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb_lab.evaluation.text_table import table_of
 
@@ -27,15 +28,20 @@ DEPTH = 'depth'  # the row of the detector without weights
 SIMULATED = (2.0, 3.0, 4.0), (-0.25, 0.0, 0.25), 1  # arguments of write_simulated_session
 
 
-def open_networks(paths, confidence):
-    """Open model files as the nodes do. Returns the NetworkDetectors by the names of the files.
+def open_networks(paths, confidence, sizes=(0,)):
+    """Open model files as the nodes do. Returns the NetworkDetectors by the names of the files and the `sizes` of their
+    input (0: the default), which do not apply to files with a fixed size.
 
     Raises ValueError if a file cannot be used, or has no class `person`.
     """
     from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_detector  # may import torch (slow)
-    running = RuntimeParams(device='cpu', threads=1)
-    return {name: open_detector(path, DetectionParams(confidence=confidence), running)
-            for name, path in named(paths).items()}
+    running, networks = RuntimeParams(device='cpu', threads=1), {}
+    for name, path in named(paths).items():
+        network = open_detector(path, DetectionParams(confidence=confidence), running)
+        for size in sizes[:1] if network.has_fixed_size else sizes:
+            sized = network.with_params(DetectionParams(confidence=confidence, image_size=size))
+            networks['%s %d' % (name, sized.input_px) if len(sizes) > 1 else name] = sized
+    return networks
 
 
 def boxes_of(network):
@@ -98,7 +104,7 @@ def best_confidence(session, network):
     Suppression keeps the best boxes, so the detections above a confidence are
     those of a lower confidence with a score above it.
     """
-    network = network.with_params(DetectionParams(confidence=CONFIDENCES[0]))
+    network = network.with_params(DetectionParams(confidence=CONFIDENCES[0], image_size=network.input_px))
     found, false = [], []  # scores of the best detection of each recorded box, and of detections of no recorded box
     for frame in annotated_frames(session):
         detections = network.detect(read_color(frame, session.camera))
@@ -127,7 +133,11 @@ def run(arguments):
     with tempfile.TemporaryDirectory() as folder:
         session = read_session(arguments.data or write_simulated_session(folder, *SIMULATED))
         session = session._replace(frames=session.frames[::arguments.every])
-        networks = open_networks(arguments.weights, arguments.confidence)
+        networks = open_networks(arguments.weights, arguments.confidence, arguments.sizes)
+        if arguments.ranges:
+            rows = found_at_ranges(annotated_frames(session), session.camera, networks, arguments.ranges, FOUND_IOU)
+            print('\n'.join(table_of(rows)))
+            return {'machine': describe_machine(), 'ranges': rows}
         detectors = {name: boxes_of(network) for name, network in networks.items()}
         detectors[DEPTH] = depth_detector(session.camera)
         result = dict(compare(session, detectors), machine=describe_machine())
@@ -149,5 +159,9 @@ def add_options(parser):
                         help='measurement session (default: $ROS_3D_BB_DATA/data/thesis, or simulated)')
     parser.add_argument('--every', type=in_range(int, 1), default=1, metavar='N',
                         help='use every Nth image (default: 1)')
+    parser.add_argument('--sizes', nargs='+', type=in_range(int, 0, MAX_INPUT_PX), default=[0], metavar='PX',
+                        help='longer sides of the input of networks that accept any (default: 640)')
+    parser.add_argument('--ranges', nargs='+', type=in_range(float, 1, 100), metavar='M',
+                        help='count the people found at these ranges only, in images that are shrunk accordingly')
     parser.add_argument('--confidence', type=in_range(float, 0, 1), default=DetectionParams().confidence, metavar='P',
                         help='smallest score of a detection of a network (default: %(default)s)')

@@ -7,8 +7,9 @@ from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBool, SetBoolResponse
 
 from ros_3d_bb.conversions.image_msgs import fill_image
-from ros_3d_bb.conversions.perception_msgs import detections2d_to_msg
+from ros_3d_bb.conversions.perception_msgs import detections2d_to_msg, stamp_of
 from ros_3d_bb.core.latest_worker import NewestWorker
+from ros_3d_bb.detection.detection_pace import DetectionPace
 from ros_3d_bb.visualization.image_overlay import draw_boxes
 
 SILENT_S = 5.0  # time without a completed detection after which a fault is reported
@@ -16,6 +17,8 @@ SILENT_S = 5.0  # time without a completed detection after which a fault is repo
 
 class DetectorWorker(object):
     """Detect objects in the newest images, and publish them for bbox3d_node and as an annotated image.
+
+    Slow detections take place in every n-th image, as the attribute `pace`, a DetectionPace, decides.
 
     `params` has `enabled` and `publish_empty`. `detect(*images)` is called in a thread of its own. It returns the RGB
     image, its Detections, and what the next stage needs with them; or None if there is no result. `names` are those of
@@ -42,14 +45,19 @@ class DetectorWorker(object):
         self._waits_since_s = None  # arrival of the oldest image since the last completed detection
         self._boxes_pub = rospy.Publisher('yolo_bounding_box', Int32MultiArray, queue_size=10)
         self._image_pub = rospy.Publisher('yolo_result_out', Image, queue_size=1)
+        self.pace = DetectionPace()
         self._worker = NewestWorker(self._work, self._on_error)
         rospy.on_shutdown(self._worker.stop)
         diagnostics.show('detector', lambda: 'working' if self._enabled else 'paused')
+        diagnostics.show('images per detection', lambda: str(self.pace.interval))
         diagnostics.check(self._faults)
         rospy.Service(part.namespace + 'enable', SetBool, self._on_request)
 
     def offer(self, *images):
         """Detect objects in these images, of which the first is the colour image, unless newer ones arrive first."""
+        if not self.pace.add_image(stamp_of(images[0])):
+            self._diagnostics.count('images skipped for a steady rate')
+            return
         if self._waits_since_s is None:
             self._waits_since_s = time.monotonic()
         if self._worker.offer(images):
@@ -59,11 +67,13 @@ class DetectorWorker(object):
         if not self._enabled:
             self._diagnostics.count('images while paused')
             return
+        start_s = time.monotonic()
         try:
             with self._diagnostics.rejecting('images'):
                 result = self._detect(*images)
                 if result is not None:
                     self._publish(images[0].header, *result)
+                self._keep_pace(time.monotonic() - start_s)
         finally:  # any outcome, such as a rejected image, shows that the detector works
             self._waits_since_s = None
 
@@ -81,6 +91,13 @@ class DetectorWorker(object):
                       for number, score in zip(detections.classes, detections.scores)]
             drawn = draw_boxes(image.copy(), detections.boxes, labels)
             self._image_pub.publish(fill_image(Image(header=header), drawn, 'rgb8'))
+
+    def _keep_pace(self, duration_s):
+        if self.pace.add_detection(duration_s):
+            size, interval = self.pace.size, self.pace.interval
+            self._diagnostics.note('changes of image size or rate', 'detecting in %s%s from now on, to keep up with the '
+                                   'camera' % ('each image' if interval == 1 else 'one of %d images' % interval,
+                                               ' with %d pixels' % size if size else ''))
 
     def _on_error(self, error):
         self._diagnostics.warn('detections failed', 'the detector failed: %s; waiting for the next image' % error)
