@@ -17,6 +17,7 @@ from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
+from ros_3d_bb.detection.detection_pace import WINDOW
 from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
@@ -34,7 +35,7 @@ from ros_3d_bb.visualization.markers import AREA, MARKERS_TOPIC, MarkerParams
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
-from support.inputs import CAMERA, good_messages, send_image, transforms
+from support.inputs import CAMERA, TARGETS, good_messages, send_image, transforms
 from support.launching import loaded
 from support.masterless import masterless
 from support.ros import depth_message, header_at, wait_until
@@ -200,6 +201,25 @@ def test_the_newest_image_is_processed_and_others_are_skipped(camera, image, mon
         sent(camera, image[0], START_NS + number)
     wait_until(lambda: newest(camera) and newest(camera).stamp_ns == START_NS + 59, 'the boxes of the last image')
     assert camera.publishers[BOXES_TOPIC].count + node._diagnostics.counts['images skipped for a newer one'] == 60
+
+
+def test_a_slow_network_gets_smaller_images_as_the_range_permits_and_then_fewer_at_a_steady_rate(monkeypatch):
+    """All detections take 50 ms, at 30 Hz."""
+    clock = mock.Mock(monotonic=mock.Mock(side_effect=np.arange(0, 1000, 0.05)))
+    monkeypatch.setattr(detector_output, 'time', clock)
+    with masterless({'weights': 'blind.pt'}) as connections:
+        node, sizes, stamps_ns = TARGETS['yolov5_node'].make(), [], []
+        for number in range(4 * WINDOW):
+            messages = good_messages(START_NS + number * NS // 30)
+            for topic in (INFO_TOPICS[0], COLOR_TOPIC):
+                connections.send(topic, messages[topic])
+            sizes.append(node._worker.pace.size)
+            stamps_ns.append(newest(connections).stamp_ns)
+    assert [sizes[count * WINDOW - 1] for count in (1, 2, 3)] == [448, 384, 384]  # 320 is too small for 8 m
+    assert set(np.diff(stamps_ns[:3 * WINDOW])) <= {NS // 30, NS // 30 + 1}
+    assert len(set(stamps_ns[3 * WINDOW - 1:])) == 1 + WINDOW // 2
+    assert node._diagnostics.counts['changes of image size or rate'] == 3
+    assert node._diagnostics.counts['images skipped for a steady rate'] == WINDOW - WINDOW // 2
 
 
 def test_no_track_starts_in_ignored_areas_nor_behind_cells_of_the_map():

@@ -22,17 +22,19 @@ class Case(NamedTuple):
 
     name: str
     detector: str    # of pipeline.launch
-    image_size: int  # of the network; 0: adaptive
+    image_size: int  # of the network; 0: the default, which adapts to the machine
     weights: str     # path of the model file
     loaded: bool     # whether another process loads a core
 
 
 def cases_of(weights):
-    """All cases for a list of model files: the first is that of the YOLOv5 cases, each other is a case of its own."""
-    detectors = [('free', 'none', 0, ''), ('depth', 'depth', 0, '')]
-    detectors += [('yolov5-%s' % (size or 'auto'), 'yolov5', size, path)
-                  for path in weights[:1] for size in (512, 640, 0)]
-    detectors += [(os.path.splitext(os.path.basename(path))[0], 'yolov5', 640, path) for path in weights[1:]]
+    """All cases for a list of model files, of which each is a case: first the defaults of each detector, then the first
+    file with the largest input, and precomputed 2D boxes.
+    """
+    detectors = [(os.path.splitext(os.path.basename(path))[0], 'yolov5', 0, path) for path in weights]
+    detectors += [('depth', 'depth', 0, '')]
+    detectors += [(name + '-640', 'yolov5', 640, path) for name, _detector, _size, path in detectors[:len(weights[:1])]]
+    detectors += [('free', 'none', 0, '')]
     return [Case(name + ('+load' if loaded else ''), detector, size, path, loaded)
             for loaded in (False, True) for name, detector, size, path in detectors]
 
@@ -102,15 +104,15 @@ def _cases(arguments):
 
 
 def add_options(parser):
-    parser.add_argument('--cases', help='some of free, depth, yolov5-512, yolov5-640, yolov5-auto and the names of '
-                        'further model files, each with or without +load, separated by commas (default: all)')
+    parser.add_argument('--cases', help='some of depth, free, the names of the model files without suffix and, for the '
+                        'first one, this name with -640, each with or without +load, separated by commas (default: '
+                        'all)')
     parser.add_argument('--seconds', type=in_range(float, 1), default=20.0,
                         help='duration of a measurement (default: 20)')
     parser.add_argument('--rate', type=in_range(float, 0.1), default=30.0, metavar='HZ',
                         help='images per second (default: 30)')
     parser.add_argument('--weights', nargs='+', default=list(filter(None, [default_weights()])), metavar='FILE',
-                        help='checkpoint or export of YOLOv5, and further model files, which are cases named by the '
-                        'file without suffix (default: yolov5n.pt in the cache, if any)')
+                        help='model files: YOLOv5 checkpoints, ONNX files (default: yolov5n.pt in the cache, if any)')
     parser.add_argument('--bag', help='bag written by scenario_to_bag or session_to_bag with --boxes (default: the '
                         'first %d images of the demo)' % IMAGES)
     parser.add_argument('--separate', action='store_true', help='run each node in a process of its own')

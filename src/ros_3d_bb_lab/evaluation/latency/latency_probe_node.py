@@ -63,7 +63,8 @@ class LatencyProbeNode(object):
                 raise ValueError('no markers within %.0f s' % START_TIMEOUT_S)
             time.sleep(0.1)
         time.sleep(WARM_UP_S)
-        pids, began_s = pids_of_nodes(), time.time()
+        pids = pids_of_nodes()
+        began_s = now_s = time.time()
         usage = {node: [] for node in pids}
         while not rospy.is_shutdown():
             now_s = time.time()
