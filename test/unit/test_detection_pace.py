@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.detection.detection_pace import MAX_PATIENCE, SIZES, WINDOW, DetectionPace, sizes_for_range
+from ros_3d_bb.core.detection_pace import MAX_PATIENCE, SIZES, WINDOW, DetectionPace, sizes_for_range
 
 
 def detected(pace, duration_of, seconds, rate_hz=30.0, start_s=0.0):

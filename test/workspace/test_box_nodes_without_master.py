@@ -12,12 +12,12 @@ from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOP
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg,
                                                    boxes3d_to_msg, stamp_of, time_from)
+from ros_3d_bb.core.detection_pace import WINDOW
 from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
-from ros_3d_bb.detection.detection_pace import WINDOW
 from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode

@@ -22,7 +22,9 @@ from ros_3d_bb.nodes.common.diagnostics import Diagnostics, unsubscribed_results
 from ros_3d_bb.nodes.common.startup import Part
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from ros_3d_bb.nodes.tracker_node import RESERVED_IDS, TrackIdReservation
-from support.ros import wait_until
+from support.ros import header_at, wait_until
+
+IMAGE, UNUSABLE = Image(header=header_at(1000)), Image(header=header_at(1000))
 
 
 @pytest.mark.parametrize('name, parts', [('bbox3d_node', ()), ('people_node', ('tracker_node', 'bbox3d_node'))])
@@ -218,7 +220,7 @@ def rig(now_s):
     """The worker, its service, the state and faults that it reports, and its detector, which takes a second."""
     def detect(image):
         now_s[0] += 1
-        if image == 'unusable':
+        if image is UNUSABLE:
             raise ValueError('an unusable image')
 
     diagnostics, path = EventCounter(), 'ros_3d_bb.nodes.common.detector_output.'
@@ -226,14 +228,14 @@ def rig(now_s):
     with mock.patch(path + 'rospy') as rospy, mock.patch(path + 'NewestWorker') as thread:
         worker = DetectorWorker(SimpleNamespace(enabled=True, publish_empty=True), diagnostics, detect, (), Part())
     yield SimpleNamespace(offer=worker.offer, enable=rospy.Service.call_args[0][2], work=thread.call_args[0][0],
-                          state=diagnostics.show.call_args[0][1],
+                          state=dict(call[0] for call in diagnostics.show.call_args_list)['detector'],
                           faults=lambda: list(diagnostics.check.call_args[0][0]()))
 
 
 def test_a_detector_that_hangs_is_reported_unless_it_is_paused(rig, now_s):
-    rig.offer('image')
+    rig.offer(IMAGE)
     now_s[0] += 4
-    rig.offer('image')  # images continue
+    rig.offer(IMAGE)  # images continue
     assert rig.faults() == [] and rig.state() == 'working'
     now_s[0] += 2
     (event, sentence), = rig.faults()
@@ -248,17 +250,17 @@ def test_a_detector_that_hangs_is_reported_unless_it_is_paused(rig, now_s):
 def test_a_detector_without_images_is_not_reported(rig, now_s):
     """After a pause of the camera, the first image is still being processed."""
     now_s[0] += 60
-    rig.offer('image')
+    rig.offer(IMAGE)
     assert rig.faults() == []
-    rig.work(('image',))
+    rig.work((IMAGE,))
     now_s[0] += 60
-    rig.offer('image')
+    rig.offer(IMAGE)
     now_s[0] += 1
     assert rig.faults() == []
 
 
 def test_a_rejected_image_is_a_completed_detection(rig):
     for _image in range(10):
-        rig.offer('unusable')
-        rig.work(('unusable',))
+        rig.offer(UNUSABLE)
+        rig.work((UNUSABLE,))
         assert rig.faults() == []

@@ -7,9 +7,9 @@ from typing import NamedTuple, Tuple
 import cv2
 import numpy as np
 
+from ros_3d_bb.core.detection_pace import SIZES
 from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.detection.boxes import Detections, non_maximum_suppression
-from ros_3d_bb.detection.detection_pace import SIZES
 
 RGB, BGR = (0, 1, 2), (2, 1, 0)  # orders of the channels of an RGB image
 RESIZE_MODES = ('center', 'corner', 'stretch')

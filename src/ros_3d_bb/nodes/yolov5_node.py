@@ -4,7 +4,7 @@ from sensor_msgs.msg import Image
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.perception_msgs import camera_from_msg
-from ros_3d_bb.detection.detection_pace import SIZES, sizes_for_range
+from ros_3d_bb.core.detection_pace import SIZES, sizes_for_range
 from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_detector
 from ros_3d_bb.nodes.common.detector_output import DetectorWorker

@@ -8,8 +8,8 @@ from std_srvs.srv import SetBool, SetBoolResponse
 
 from ros_3d_bb.conversions.image_msgs import fill_image
 from ros_3d_bb.conversions.perception_msgs import detections2d_to_msg, stamp_of
+from ros_3d_bb.core.detection_pace import DetectionPace
 from ros_3d_bb.core.latest_worker import NewestWorker
-from ros_3d_bb.detection.detection_pace import DetectionPace
 from ros_3d_bb.visualization.image_overlay import draw_boxes
 
 SILENT_S = 5.0  # time without a completed detection after which a fault is reported

@@ -8,12 +8,12 @@ from ros_3d_bb.core.time_sync import NS, median_period_ns
 
 SIZES = 320, 384, 448, 512, 576, 640  # longer sides, pixels; multiples of 64, the largest stride
 TARGET_PERIOD_S = 1 / 30.0  # faster cameras do not reduce the size further
-WINDOW = 15  # images and detections over which times are averaged
+WINDOW = 15  # images and detections of which the median is used
 # Share of the period from which on detections are too slow. Durations vary: with a 95 % quantile of 1.6 medians, as in
 # people_node, 0.75 loses 1 of 500 images, 0.9 one of 40 (test_detection_pace.py).
 BUSY_SHARE = 0.75
 FREE_SHARE = 0.6  # share of the period that a larger size may take, as estimated from its number of pixels; chosen
-PATIENCE, MAX_PATIENCE = 4, 512  # number of windows in a row in which there must be time for more work
+PATIENCE, MAX_PATIENCE = 4, 512  # windows of images in a row with enough time before work is increased; chosen
 PERSON_M = 1.7  # height of a person
 # Height of a person in the input from which on YOLOv5n finds 9 of 10 people of the thesis; it finds no more of them at
 # 8 m in larger inputs. At 65 to 70 pixels 8, at 53 pixels 4. Measured:
@@ -90,7 +90,7 @@ class DetectionPace(object):
                 self._set(*reduced)
                 return True
             increased = self._increased(duration_s, period_s)
-            self._windows_with_time = 0 if increased is None else self._windows_with_time + 1
+            self._windows_with_time = 0 if increased is None else self._windows_with_time + self.interval
             if self._windows_with_time < self._patience:
                 return False
             self._set(*increased)
