@@ -9,8 +9,8 @@ from ros_3d_bb.core.time_sync import NS, median_period_ns
 SIZES = 320, 384, 448, 512, 576, 640  # longer sides, pixels; multiples of 64, the largest stride
 TARGET_PERIOD_S = 1 / 30.0  # faster cameras do not reduce the size further
 WINDOW = 15  # images and detections of which the median is used
-# Share of the period from which on detections are too slow. Durations vary: with a 95 % quantile of 1.6 medians, as in
-# people_node, 0.75 loses 1 of 500 images, 0.9 one of 40 (test_detection_pace.py).
+# Share of the period from which on detections are too slow. Durations vary: with a 95 % quantile of 1.6 medians, as
+# measured in people_node, a share of 0.75 loses one of 500 images, 0.9 one of 40 (simulated, see its tests).
 BUSY_SHARE = 0.75
 FREE_SHARE = 0.6  # share of the period that a larger size may take, as estimated from its number of pixels; chosen
 PATIENCE, MAX_PATIENCE = 4, 512  # windows of images in a row with enough time before work is increased; chosen
@@ -33,10 +33,10 @@ def sizes_for_range(range_m, focal_px, image_px):
 class DetectionPace(object):
     """Chooses the largest size with which a detection takes less time than the period of the images.
 
-    If the smallest size takes longer, detections take place in every n-th image: at a steady rate, and in an image that
-    has just arrived. The mean age of the results is then not higher than with detections that begin when the last one
-    ends, in the newest image before: these wait for half a period on average, and the next one ends after the duration
-    of a detection, which is at most a period less than n periods.
+    If the smallest size takes longer, detections take place in every n-th image, at a steady rate. An image with a
+    detection has just arrived, while it waits for half a period on average if each detection begins when the last one
+    ends. Therefore the newest result is not older on average, although detections are fewer: for a duration of d
+    periods its age is d + n / 2 instead of d + 1 / 2 + d / 2, and n < d + 1.
 
     Work is reduced after one window of detections that are too slow, and increased after several in which there was
     enough time. Each time that an increase is undone, the next one has to wait for twice as many windows, so that size

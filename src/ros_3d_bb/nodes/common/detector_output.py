@@ -94,10 +94,9 @@ class DetectorWorker(object):
 
     def _keep_pace(self, duration_s):
         if self.pace.add_detection(duration_s):
-            size, interval = self.pace.size, self.pace.interval
-            self._diagnostics.note('changes of image size or rate', 'detecting in %s%s from now on, to keep up with the '
-                                   'camera' % ('each image' if interval == 1 else 'one of %d images' % interval,
-                                               ' with %d pixels' % size if size else ''))
+            size = ' with an input of %d pixels' % self.pace.size if self.pace.size else ''
+            self._diagnostics.note('changes of image size or rate', 'detecting in one of %d images%s from now on, to '
+                                   'keep up with the camera' % (self.pace.interval, size))
 
     def _on_error(self, error):
         self._diagnostics.warn('detections failed', 'the detector failed: %s; waiting for the next image' % error)
