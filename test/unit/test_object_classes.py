@@ -1,4 +1,5 @@
 import os
+import re
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.object_classes import (CLASSES, MAX_CLASSES, MAX_IN_GROUP, PERSON_CLASS, ObjectClass, ObjectClasses,
                                            object_classes_from, read_object_classes)
+from ros_3d_bb.core.yaml_loader import load_yaml
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
@@ -17,6 +19,12 @@ CAMERA = Camera(640, 480, 600.0, 600.0, 320.0, 240.0)
 
 def table(**classes):
     return {'classes': dict({'person': {}}, **classes)}
+
+
+def test_the_example_of_a_class_can_be_added_to_the_file():
+    with open(FILE) as file, open(os.path.join(ROOT, 'doc', 'detectors.md'), encoding='utf-8') as page:
+        line, = re.findall(r'add a line, such as `(.*)`', page.read())
+        assert object_classes_from(load_yaml('%s  %s' % (file.read(), line))).of('forklift').length == 2.5
 
 
 def test_the_file_is_the_table_in_the_code():

@@ -1,4 +1,6 @@
 import os
+import pathlib
+import re
 
 import cv2
 import numpy as np
@@ -17,6 +19,14 @@ def read_frame(folder, **changes):
             del entry[name]
     change_json(folder, change)
     return read_session(folder).frames[0]
+
+
+def test_the_example_of_a_session_is_valid(tmp_path):
+    page = pathlib.Path(__file__).resolve().parents[2] / 'doc' / 'session.md'
+    example, = re.findall(r'^```\n(\{.*?)```', page.read_text(encoding='utf-8'), re.DOTALL | re.MULTILINE)
+    (tmp_path / 'frames.json').write_text(example)
+    frame, = read_session(str(tmp_path)).frames
+    assert frame.label == 'facing the camera' and frame.boxes_px == ((224, 1, 412, 474),)
 
 
 @pytest.mark.parametrize('lens, expected', [

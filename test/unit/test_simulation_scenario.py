@@ -1,3 +1,5 @@
+import pathlib
+import re
 import xml.etree.ElementTree as ElementTree
 from types import SimpleNamespace
 
@@ -5,12 +7,13 @@ import numpy as np
 import pytest
 
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.core.yaml_loader import load_yaml
 from ros_3d_bb.tracking.types import CameraView
 from ros_3d_bb_lab.evaluation.gazebo.people_truth import PeopleTruth
 from ros_3d_bb_lab.simulation.gazebo_world import HEIGHT_M, PERSON_NAME, world_of
 from ros_3d_bb_lab.simulation.motion import person_motion
 from ros_3d_bb_lab.simulation.scenario import (Drive, Follow, Furniture, Mount, Move, Person, Robot, Room, Scenario,
-                                               scenario_from)
+                                               read_scenario, scenario_from)
 
 
 # Key path of each record, as in error messages.
@@ -128,3 +131,22 @@ def test_true_tracks_have_position_velocity_and_future_positions():
     np.testing.assert_allclose(track.velocity_mps, [0.5, -1, 0], atol=1e-6)
     np.testing.assert_allclose(track.prediction_m[-1, :2], [6, -3], atol=1e-6)
     assert (track.id, track.moving, track.prediction_step_s * len(track.prediction_m)) == (1, True, 2.0)
+
+
+PAGE = pathlib.Path(__file__).resolve().parents[2] / 'config' / 'scenarios' / 'README.md'
+
+
+def test_the_examples_of_a_scenario_are_valid(tmp_path):
+    """The whole file, and with its alternatives, which are comments."""
+    text = PAGE.read_text(encoding='utf-8')
+    example, = re.findall(r'```yaml\n(.*?)```', text, re.DOTALL)
+    path = tmp_path / 'example.yaml'
+    path.write_text(example.replace('rooms/', str(PAGE.parent / 'rooms') + '/'))
+    assert len(read_scenario(str(path)).objects) == 4
+    content = load_yaml(re.sub(r'^( *)# (?!Description)', r'\1', example, flags=re.MULTILINE))
+    moves = {name: load_yaml(move.replace('[x, y]', '[1.0, 0.5]'))
+             for move in re.findall(r'^\| `(\{.*?\})`', text, re.MULTILINE) for name in re.findall(r'^\{(\w+)', move)}
+    robot = {key: value for key, value in content['robot'].items() if key not in ('repeat', 'mount', 'pitch')}
+    for other in ({'moves': [moves['to'], moves['turn'], {'wait': 1.0}]}, {'follow': robot.pop('follow')}):
+        scenario_from(dict(content, robot=dict(robot, **other), people=[
+            dict(content['people'][0], moves=[moves['to'], moves['wait']])]))

@@ -4,6 +4,7 @@ import contextlib
 import glob
 import os
 import re
+import shlex
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -11,13 +12,15 @@ from unittest import mock
 
 import pytest
 
+from ros_3d_bb.core.object_classes import COCO
 from ros_3d_bb.core.params import SET_BY_LAUNCH, table_of
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.core.yaml_loader import load_yaml
 from ros_3d_bb.nodes.people_node import PeopleNode
 from ros_3d_bb.nodes.realsense_node import RealSenseNode
 from ros_3d_bb_lab.simulation.ros.simulator_node import SimulatorNode
-from support.code_blocks import PAGES
-from support.inputs import TARGETS, send_image
+from support.code_blocks import BLOCKS, PAGES
+from support.inputs import TARGETS, Blind, send_image
 from support.masterless import masterless
 from support.pages import DOC, ROOT, node_pages
 from support.planner_definitions import package
@@ -164,6 +167,46 @@ def test_named_files_and_launch_arguments_exist(page):
             assert glob.glob(os.path.join(ROOT, path)), path
         if ' ' not in code and not code.startswith('-'):
             assert set(re.findall(r'\b([a-z]\w*):=', code)) - known == set(), code
+
+
+PARAMETERS = {name: table_of(node_pages.parameter_types(NODES[name].node_class)) for name in TARGETS}
+
+
+def accepts(name, values):
+    """Whether a node starts with these parameters; `yolov5_node` with a network that has the classes of the pages."""
+    with masterless(dict(TARGETS[name].params, **values)), mock.patch.object(Blind, 'names', COCO + ['wheelchair']):
+        return TARGETS[name].make() is not None
+
+
+def examples_in_files():
+    """(node, text that stands in its parameter file): examples in comments, in the prose and in blocks of the pages."""
+    for name, table in PARAMETERS.items():
+        for parameter, param in table.items():
+            for example in re.findall(r'such as (\[.*\])', param.text):
+                yield name, '%s: %s' % (parameter, example)
+    texts = [text for page in PAGES for text in re.findall(r'`(\w+: [^`\n]+)`', prose_of(page))]
+    texts += [block.text for block in BLOCKS if block.language == 'yaml']
+    for text in sorted(set(texts)):
+        for name in sorted(PARAMETERS):
+            if set(re.findall(r'^(\w+):', text, re.MULTILINE)) <= set(PARAMETERS[name]) and '/absolute' not in text:
+                yield name, text
+
+
+@pytest.mark.parametrize('name, text', examples_in_files())
+def test_examples_of_parameters_can_be_written_to_the_file_of_the_node(name, text):
+    assert accepts(name, load_yaml(text))
+
+
+@pytest.mark.parametrize('name, given', [given for page in PAGES for given in re.findall(
+    r'dynparam set +/(\w+) +([^`\n]+)', text_of(page).replace('\\\n', ''))])
+def test_examples_of_live_parameters_are_accepted(name, given):
+    """`dynparam` converts them to the type of the parameter; lists have the type text."""
+    words = shlex.split(given)
+    values = {words[0]: words[1]} if len(words) == 2 else load_yaml(words[0])
+    kinds = {parameter: type(PARAMETERS[name][parameter].default) for parameter in values}
+    assert all(PARAMETERS[name][parameter].live for parameter in values)
+    assert accepts(name, {parameter: value if kinds[parameter] is tuple else kinds[parameter](value)
+                          for parameter, value in values.items()})
 
 
 @pytest.mark.parametrize('page', PAGES)

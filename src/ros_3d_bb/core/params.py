@@ -1,11 +1,17 @@
 """Parameters of a node: their schema, and conversion of the parameter server's values to validated NamedTuples."""
 import difflib
+import json
 import re
 import sys
 from typing import Any, NamedTuple, Tuple, Union
 
 LARGEST = 1e6
 MAX_FLOAT = sys.float_info.max
+
+
+class NestedList(str):
+    """Type of a parameter that is a list of lists: as text, which dynamic_reconfigure can send, in the notation of YAML
+    and JSON. A file may also contain the list itself."""
 
 
 class Param(NamedTuple):
@@ -80,8 +86,8 @@ def table_of(kinds):
 def params_from(given, *kinds):
     """Fill types decorated with `parameters` from a flat dictionary; missing keys keep their defaults.
 
-    A float may be given as an int, a str as a number (roslaunch converts `0` to one), a list as `a, b`. Returns a list
-    with one instance of each type. Raises ValueError if a key is unknown (the message names the nearest known one), or
+    A float may be given as an int, a str as a number (roslaunch converts `0` to one), a list as `a, b`, a NestedList as
+    a list. Returns a list with one instance of each type. Raises ValueError if a key is unknown (the message names the nearest known one), or
     a value has the wrong type or is not allowed.
     """
     known = [name for kind in kinds for name in kind._fields]
@@ -129,6 +135,8 @@ def _converted(name, value, kind):
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if isinstance(value, kind) and isinstance(value, bool) == (kind is bool):
         return value
+    if kind is NestedList:
+        return json.dumps(value) if isinstance(value, list) else _converted(name, value, str)
     if number and (kind is float or kind is str):
         return kind(value)
     if kind is list and isinstance(value, (str, int)):

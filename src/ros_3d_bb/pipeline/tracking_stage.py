@@ -16,7 +16,8 @@ from ros_3d_bb.conversions.perception_msgs import (camera_from_msg, occupied_fro
                                                    usable_boxes3d)
 from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.object_classes import read_object_classes
-from ros_3d_bb.core.params import CLASSES_FILE, DEPTH, DEPTH_SCALE, SET_BY_LAUNCH, STAMP_TOLERANCE, Param, parameters
+from ros_3d_bb.core.params import (CLASSES_FILE, DEPTH, DEPTH_SCALE, SET_BY_LAUNCH, STAMP_TOLERANCE, NestedList, Param,
+                                   parameters)
 from ros_3d_bb.core.time_sync import NS, CameraClocks, MessageCache
 from ros_3d_bb.estimation.error_model import error_model_of_param
 from ros_3d_bb.pipeline.depth_registration import DepthRegistration
@@ -59,7 +60,7 @@ class TrackerNodeParams(NamedTuple):
         1.0, 'With several cameras, no tracks are published while there are no boxes of one of them for this time, so '
         'that planners stop. Detectors must publish empty arrays, too (publish_empty). 0: the tracks of the other '
         'cameras are published, and planners drive on as if the silent one saw no people.', 's')
-    ignored_areas: str = Param(
+    ignored_areas: NestedList = Param(
         '', 'Polygons of target_frame in which no track starts, as around mirrors and posters: a list of lists of '
         'corners, such as [[[1, 2], [3, 2], [3, 4]]]; empty: none. Tracked people can walk through. Tracks in an area '
         'end when it is set.', 'm', live=True, section=PLACES)
