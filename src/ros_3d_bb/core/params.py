@@ -87,8 +87,8 @@ def params_from(given, *kinds):
     """Fill types decorated with `parameters` from a flat dictionary; missing keys keep their defaults.
 
     A float may be given as an int, a str as a number (roslaunch converts `0` to one), a list as `a, b`, a NestedList as
-    a list. Returns a list with one instance of each type. Raises ValueError if a key is unknown (the message names the nearest known one), or
-    a value has the wrong type or is not allowed.
+    a list. Returns a list with one instance of each type. Raises ValueError if a key is unknown (the message names the
+    nearest known one), or a value has the wrong type or is not allowed.
     """
     known = [name for kind in kinds for name in kind._fields]
     for name in sorted(given):
