@@ -14,7 +14,8 @@ def run(*arguments):
     return result.returncode, result.stdout, result.stderr
 
 
-@pytest.mark.parametrize('arguments', [(), ('help',), ('--help',), ('test', '--help'), ('demo', '--help')])
+@pytest.mark.parametrize('arguments', [(), ('help',), ('--help',)] + [
+    (command, '--help') for command in ('demo', 'test', 'gazebo', 'lint', 'setup', 'build', 'planners', 'soak', 'doc')])
 def test_help_starts_nothing(arguments):
     status, printed, errors = run(*arguments)
     assert status == 0 and printed.startswith('usage: ./run') and not errors
@@ -23,6 +24,7 @@ def test_help_starts_nothing(arguments):
 @pytest.mark.parametrize('arguments', [
     ('tset',), ('test', '--quick'), ('test', '--fast', 'x'), ('test', '--platform'), ('test', '--platform', 'kinetic'),
     ('test', 'missing.py'), ('test', '-k'), ('build', 'x'), ('setup', 'x'), ('lint', '--all'),
+    ('planners', 'x'), ('doc', '--theme'), ('doc', 'site', 'x'),
     ('demo', '--fast'), ('demo', 'missing'), ('demo', 'rate:=fast'), ('demo', 'weights:=missing.pt')])
 def test_unknown_arguments_are_errors(arguments):
     status, printed, errors = run(*arguments)

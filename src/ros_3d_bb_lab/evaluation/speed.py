@@ -29,6 +29,7 @@ from ros_3d_bb.tracking.types import CameraView, Detection, detections_from_boxe
 from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker
 from ros_3d_bb_lab.evaluation.baselines.published_code import PublishedCode, load_published
 from ros_3d_bb_lab.evaluation.defaults import data_folder, default_weights, describe_machine, in_range
+from ros_3d_bb_lab.evaluation.progress import with_progress
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb_lab.evaluation.text_table import line_of, table_of
 
@@ -171,7 +172,7 @@ def _times_ms(crowds, kinds, images, random):
     """CPU times of the images, (images, crowds, algorithms, stages); `kinds` create an algorithm for a crowd."""
     algorithms = [[kind(crowd) for kind in kinds] for crowd in crowds]
     times_ms = np.empty((images + WARM_UPS, len(crowds), len(kinds), len(STAGES)))
-    for image in range(len(times_ms)):
+    for image in with_progress(range(len(times_ms))):
         for number, crowd in enumerate(crowds):
             rects_px = crowd.jittered(random)
             for turn in range(len(kinds)):

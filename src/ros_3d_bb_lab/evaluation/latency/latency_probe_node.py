@@ -56,15 +56,16 @@ class LatencyProbeNode(object):
             arrivals.append((stamp_ns, arrival_s))
 
     def measure(self):
-        """Wait for markers, measure, and write the record."""
+        """Wait for markers, measure, and write the record, unless the node is shut down before."""
         deadline_s = time.monotonic() + START_TIMEOUT_S
         while not self._arrivals['markers'] and not rospy.is_shutdown():
             if time.monotonic() > deadline_s:
                 raise ValueError('no markers within %.0f s' % START_TIMEOUT_S)
             time.sleep(0.1)
         time.sleep(WARM_UP_S)
-        pids = pids_of_nodes()
-        began_s = now_s = time.time()
+        if rospy.is_shutdown():
+            return
+        pids, began_s = pids_of_nodes(), time.time()
         usage = {node: [] for node in pids}
         while not rospy.is_shutdown():
             now_s = time.time()
@@ -75,6 +76,8 @@ class LatencyProbeNode(object):
             if now_s >= began_s + self._params.seconds:
                 break
             time.sleep(min(SAMPLE_S, began_s + self._params.seconds - now_s))
+        else:
+            return
         load = os.getloadavg()[0]
         time.sleep(GRACE_S)
         record = {'began_s': began_s, 'ended_s': now_s, 'sent_ns': self._sent_ns, 'arrivals': self._arrivals,
