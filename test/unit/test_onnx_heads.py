@@ -74,7 +74,9 @@ def by_stride(channels):
 @pytest.mark.parametrize('given, reason', [
     (dict(outputs=by_stride((80, 4))), 'first output'),  # distances that are no distributions, as of RTMDet
     (dict(outputs=by_stride((80, 4)), head='nanodet'), 'first output'),
-    (dict(outputs=[np.zeros((1, 252, 4)), np.zeros((1, 252, 80))]), 'no known head'),  # boxes and scores
+    (dict(outputs=[np.zeros((1, 252, 4)), np.zeros((1, 252, 80))]), '252 x 80, .* no known head'),  # boxes and scores
+    (dict(outputs=[np.zeros((1, 252, 80)), np.zeros((1, 252, 4))]), 'separate outputs'),  # of DAMO-YOLO
+    (dict(outputs=[np.zeros((1, 80, 252)), np.zeros((1, 4, 252))]), 'separate outputs'),
     (dict(outputs=[]), 'first output'), (dict(outputs=[np.zeros((1, 77, 79))]), 'no known head'),
     (dict(outputs=[np.full((1, 300, 6), 0.3)]), 'no known head'),  # boxes and scores of two classes
     (dict(names=['a', 'b']), '2 names for its 3 classes'), (dict(head='yolox'), 'cells of strides'),

@@ -122,14 +122,22 @@ def rows_below(page, header):
     return [cells_of(line) for line in lines[:ends[0]]]
 
 
-def test_messages_in_the_table_of_symptoms_are_in_the_code():
-    """`…` replaces values, in the code conversion specifiers."""
-    texts = []
+def texts_in_code():
     for path in glob.glob(os.path.join(ROOT, 'src', '**', '*.py'), recursive=True):
         for node in ast.walk(ast.parse(text_of(path))):
             text = getattr(node, 'value', getattr(node, 's', None))  # `s` before Python 3.8
             if isinstance(text, str):
-                texts.append(FORMAT.sub('…', text))
+                yield text
+
+
+def test_no_message_names_the_launch_argument_of_a_parameter_itself():
+    """The node appends it, or process_bag its option, see `params.with_places`."""
+    assert [text for text in texts_in_code() if re.search(r'~[a-z]\w*[^.;,]* \(launch argument', text)] == []
+
+
+def test_messages_in_the_table_of_symptoms_are_in_the_code():
+    """`…` replaces values, in the code conversion specifiers."""
+    texts = [FORMAT.sub('…', text) for text in texts_in_code()]
     rows = rows_below('doc/troubleshooting.md', '| what you see | cause | what to do |')
     quoted = [message for row in rows for message in re.findall(r'`([^`]+)`', row[0]) if ' ' in message]
     assert len(quoted) > 10

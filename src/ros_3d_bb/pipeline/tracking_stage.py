@@ -177,8 +177,7 @@ class TrackingStage(object):
         stamp_ns, camera_name = stamp_of(message), camera or message.header.frame_id
         frame_id, target_frame = self._params.camera_frame or message.header.frame_id, self._params.target_frame
         if not frame_id:
-            raise ValueError('their images have no frame_id; set ~frame_id (launch argument frame_id:=) to the optical '
-                             'frame of the camera')
+            raise ValueError('their images have no frame_id; set ~frame_id to the optical frame of the camera')
         if frame_id.lstrip('/') == target_frame:
             raise ValueError('%s (~target_frame); %s' % (target_frame_fault(target_frame, frame_id), POSE))
         with self.lock:
@@ -205,8 +204,7 @@ class TrackingStage(object):
         fault = viewing_fault(self._params.camera_frame or message.header.frame_id, pose.target_from_camera)
         if fault:
             self._tracker.skip(stamp_ns, camera_name)
-            raise ValueError('%s; set ~frame_id (launch argument frame_id:=) to the optical frame, or correct its '
-                             'transform' % fault)
+            raise ValueError('%s; set ~frame_id to the optical frame, or correct its transform' % fault)
         boxes, faults = usable_boxes3d(message)
         if faults:
             self._events.count_dropped('3D boxes', faults)

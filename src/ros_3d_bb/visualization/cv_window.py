@@ -10,7 +10,7 @@ FLAGS = 0x10  # WINDOW_GUI_NORMAL, which old versions do not define: no toolbar,
 # X keysyms of keys on the keypad, and of those that edit text
 KEYSYMS = {0xff08: '\b', 0xff0d: '\r', 0xff8d: '\r', 0xff1b: '\x1b', 0xffad: '-', 0xffae: '.'}
 KEYSYMS.update((0xffb0 + digit, str(digit)) for digit in range(10))
-REMEDY = 'set ~window:=false (launch argument window:=false) to run without a window'
+REMEDY = 'set ~window to false to run without a window'
 
 
 class Window(object):

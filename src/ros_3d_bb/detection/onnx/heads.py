@@ -89,6 +89,10 @@ def layout_of(outputs, input_hw, metadata, head='', strides=(), names=()):
         raise ValueError('strides in the YAML file is %s, a grid of %d cells, which the %d x %d values of its first '
                          'output do not fit; without this key, strides are recognised' % (
                              list(strides), cell_count(input_hw, strides), shapes[0][1], shapes[0][2]))
+    if grid and not head and any(len(shape) == 3 and _matches(shape, cell_count(input_hw, grid))
+                                 for shape in shapes[1:]):
+        raise ValueError('scores and boxes are separate outputs, %s, which are those of no known head'
+                         % ' and '.join('%s x %s' % shape[1:] for shape in shapes if len(shape) == 3))
     head = head or _head_of(outputs[0], input_hw, grid, metadata)
     if HEADS[head].strides and not (grid and shapes[0][1] == cell_count(input_hw, grid)):
         raise ValueError('its first output has %d rows, which are not the cells of strides %s; the key strides in the '

@@ -60,8 +60,8 @@ def open_detector(weights, detection=DetectionParams(), running=RuntimeParams(),
         If no weights are given or the network cannot be used.
     """
     if not weights:
-        raise ValueError('no weights given; set ~weights (launch argument weights:=) to the path of a YOLOv5 '
-                         'checkpoint such as yolov5n.pt, or of an ONNX file of another detector')
+        raise ValueError('no weights given; set ~weights to the path of a YOLOv5 checkpoint such as yolov5n.pt, or '
+                         'of an ONNX file of another detector')
     detector = NetworkDetector(open_runtime(os.path.abspath(os.path.expanduser(weights)), running, warn), detection)
     detector.detect(np.zeros((480, 640, 3), np.uint8))  # the first detection takes several times as long as others
     return detector

@@ -13,6 +13,8 @@ from ros_3d_bb.nodes.common.master import Registration
 PARAMS_FILES = {'%s_node' % name: '%s_params' % name for name in (
     'bbox3d', 'camera_pose', 'depth_detector', 'planner_bridge', 'realsense', 'tracker', 'viewer', 'yolov5')}
 PARAMS_FILES.update({'%s_node' % name: 'params' for name in ('follow', 'people_removal', 'speed_limit')})
+# Parameters that are named by the launch argument of the same name, not by a file, which few have for them.
+ARGUMENTS = 'weights', 'scenario', 'window', 'frame_id'
 POLL_S = 0.05
 SETTLING_S = 1.0  # a node that has connected to one topic may still be connecting to the others
 SENDING_S = 1.0  # from the last message to the exit: rospy drops messages that it has not sent before the shutdown
@@ -58,11 +60,13 @@ def launch_places(nodes):
     """Return a function that returns the launch argument which sets a parameter of some nodes, as text.
 
     It is empty for a name that is not on the parameter server: then the node was started without a launch file, or the
-    name is that of a service.
+    name is that of a service. It is one of `ARGUMENTS`, or a file.
     """
     stored = {PARAMS_FILES[node]: stored_params(rospy.resolve_name(node)) for node in nodes if node in PARAMS_FILES}
 
     def place_of(name):
+        if name in ARGUMENTS:
+            return 'launch argument %s:=' % name if any(stored.values()) else ''
         files = sorted(argument for argument, params in stored.items() if name in params)
         return 'launch argument %s' % ' or '.join('%s:=FILE' % each for each in files) if files else ''
     return place_of
