@@ -145,14 +145,15 @@ def test_a_fault_is_reported_until_it_ends(rig, name):
 
 
 def test_renamed_topics_and_unreachable_publishers_are_reported(healthy):
-    """As the last test of the graph: depth is on the topic of another camera, and camera_info is published by a node on
-    a machine with an unknown name. There are no 2D boxes any more, which would be rejected.
+    """As the last test of the graph: depth is on the topic of another camera, camera_info is published by a node on a
+    machine with an unknown name, and 2D boxes by one with another version of the message.
     """
     ghost, address = rosgraph.Master('/ghost'), 'http://no.such.host.invalid:40000'
     healthy.log.emptied()
     rospy.Publisher('front/aligned_depth_to_color/image_raw', Image, queue_size=1)
     for topic in (BOXES, DEPTH, INFO):
         healthy.pubs.pop(topic).unregister()
+    rospy.Publisher(BOXES, type('Other', (Int32MultiArray,), {'_md5sum': '0' * 32}), queue_size=1)
     ghost.registerPublisher('/' + INFO, 'sensor_msgs/CameraInfo', address)
     try:
         output = diagnosed()
@@ -160,7 +161,10 @@ def test_renamed_topics_and_unreachable_publishers_are_reported(healthy):
         assert 'camera_depth:=/front/aligned_depth_to_color/image_raw' in output
         unreachable = '/ghost publishes it, but this machine cannot resolve its host name no.such.host.invalid'
         assert unreachable in output and 'ROS_IP' in output
+        other = 'it has another version of std_msgs/Int32MultiArray (md5sum 000'
+        assert other in output and 'build the same version of std_msgs on all machines' in output
         healthy.wait_for_line('bbox3d_node', 'no publishers on /%s; start the camera' % DEPTH)
+        healthy.wait_for_line('bbox3d_node', other)
         healthy.wait_for_line('bbox3d_node', unreachable)
     finally:
         ghost.unregisterPublisher('/' + INFO, address)

@@ -100,6 +100,19 @@ def test_depth_images_out_of_order_lose_no_others():
     assert recorder.frames == [(n, n, 'camera') for n in range(60)] and recorder.dropped == []
 
 
+@pytest.mark.parametrize('ahead_ns, dropped', [(0, []), (3 * NS, [28, 29]), (1500 * MS, [28, 29])])
+def test_boxes_from_before_a_jump_ahead_are_no_fault_of_the_detector(ahead_ns, dropped):
+    """As where a simulated scene starts again: the depth images from before are no longer cached."""
+    recorder = Recorder()
+    recorder.add('camera', None, 0, 'camera')
+    arrivals = sorted([(n * PERIOD, 'depth', n) for n in range(60)] + [(n * PERIOD + 90 * MS, 'boxes', n)
+                                                                       for n in range(60)])
+    for now_ns, kind, number in arrivals:
+        recorder.add(kind, number * PERIOD + (ahead_ns if number >= 30 else 0), now_ns, number)
+    assert recorder.dropped == dropped
+    assert recorder.frames == [(n, n, 'camera') for n in range(60) if n not in dropped]
+
+
 def test_boxes_of_the_first_image_wait_until_the_period_is_known():
     recorder = Recorder(tolerance_ns=0)
     recorder.add('camera', 0, 0, 'camera')
@@ -138,7 +151,7 @@ SEQUENCES = {
     'a camera is published once, before a time jump':
         ([('camera', 9999), ('depth', 9999), ('depth', 1), ('boxes', 1)], (3, 2, 0)),
     'the depth image was lost': ([('depth', 1), ('boxes', 2), ('depth', 3)], (1, None, None)),
-    'the depth image is no longer cached': ([('depth', 1), ('depth', 40), ('boxes', 1)], (2, None, None)),
+    'the depth image is no longer cached': ([('depth', 1), ('depth', 20), ('depth', 40), ('boxes', 1)], (3, None, None)),
     'boxes arrive first after a pause':
         ([('depth', 1), ('boxes', 9999), ('camera', 9999), ('depth', 9999)], (1, 3, 2)),
     'boxes without a stamp, and no depth image': ([('boxes', None)], (0, None, None)),

@@ -133,6 +133,8 @@ CASES = [
     (with_stream(BOXES2D, lag_s=1.6), 'boxes and depth', '1.6 s after their depth image', 'cache_length'),
     (silent(BOXES3D), '3D boxes', 'no messages on /camera/boxes3d', 'wake it up'),
     (silent(TRACKS), 'tracks', 'no messages on /camera/tracks', 'wake it up'),
+    (with_stream(COLOR, senders=('/camera', '/play_1')), 'publishers', '/camera and /play_1', 'stop all'),
+    (sound(tf_senders={'base_link': ('/ekf', '/odometry')}), 'publishers', 'base_link of tf', 'stop all'),
     (sound(nodes={'tracker_node': (1, 'no transform')}), 'tracker_node', 'no transform', 'log'),
     (sound(use_sim_time=True), 'time', 'no messages on /clock', 'use_sim_time false'),
     (sound(clock_count=9), 'time', '/use_sim_time is not set', 'use_sim_time true')]

@@ -107,6 +107,29 @@ def test_costs_are_around_the_robot_where_it_is_now():
         assert not np.any(bridge.message(COSTS).data)
 
 
+@pytest.mark.parametrize('jump_s', [-6.0, 3.1])
+@pytest.mark.parametrize('clock_first', [True, False])
+def test_tracks_from_before_a_jump_in_time_are_dropped_without_advice(jump_s, clock_first):
+    """As where a bag or a simulated scene starts again: ROS time, or the tracks, are those of the new time first."""
+    with bridge_with('people') as bridge:
+        bridge.send(START_NS, person(1, 2, 0))
+        after_ns = START_NS + int(jump_s * NS)
+        bridge.set_time(after_ns if clock_first else START_NS)
+        bridge.send(START_NS if clock_first else after_ns, person(1, 2, 0))
+        assert bridge.counts['tracks from before a time jump'] == 1 and 'tracks rejected' not in bridge.counts
+        bridge.set_time(after_ns)
+        bridge.send(after_ns, person(1, 2, 0))
+        assert bridge.counts['tracks forwarded'] == 2
+
+
+def test_tracks_of_another_clock_are_rejected_with_advice():
+    with bridge_with('people') as bridge:
+        bridge.set_time(START_NS)
+        for number in range(3):
+            bridge.send(START_NS - (6 - number) * NS // 10 * 10, person(1, 2, 0))
+        assert bridge.counts == {'tracks rejected': 3}
+
+
 @pytest.mark.parametrize('ahead_s, expected', [(-1.1, 0), (-0.9, 1), (0.9, 1), (1.1, 0)])
 def test_costs_are_withheld_where_the_robot_is_unknown(ahead_s, expected):
     """Its latest pose is further than ~timeout, 1 s, from the clock."""

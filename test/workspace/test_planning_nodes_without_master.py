@@ -218,6 +218,14 @@ def test_a_robot_with_a_pose_of_another_time_stands(age_s, expected):
         assert robot.forwarded(START_NS + max(int(age_s * NS), 0) + NS // 100) == 1.0
 
 
+def test_a_jump_in_time_is_not_reported_as_missing_tracks():
+    with robot_with() as robot:
+        robot.send_tf(START_NS)
+        assert robot.forwarded(START_NS) == 1.0
+        robot._connections.now = time_from(START_NS - 6 * NS)
+        assert robot.limit() == 0.0 and not {'no recent tracks', 'no transform'} & set(robot.counts)
+
+
 def test_static_transforms_and_those_between_equal_frames_do_not_age():
     with robot_with() as robot:
         robot.send_tf(START_NS, '/tf_static')

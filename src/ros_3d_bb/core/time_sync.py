@@ -125,7 +125,7 @@ class StampSynchronizer(object):
     Images are kept, and boxes wait, for `length_ns`. The stamps of one frame differ by at most `tolerance_ns`, see
     `MessageCache.matching`. All boxes are passed to exactly one of two callbacks, in the order of arrival, by the
     methods `add_` and `end`: `on_frame` with boxes and depth, both Stamped, and camera of one frame, or `on_lost` with
-    unmatched boxes, Stamped, and whether they are lost because time jumped back.
+    unmatched boxes, Stamped, and whether they are lost because time jumped.
     """
 
     def __init__(self, length_ns, tolerance_ns, assumed_delay_ns, on_frame, on_lost):
@@ -135,6 +135,7 @@ class StampSynchronizer(object):
         self._plain_camera = None  # camera_info without a stamp; None if the newest one has a stamp
         self._waiting = []
         self._end_before_ns = 0  # the last stamp before time jumped back
+        self._ahead_ns = 0, 0  # the last stamp before time jumped ahead, and the first one after it
         self._newest_boxes_ns, self._boxes_went_back = 0, False  # whether depth images of the new time are awaited
 
     @property
@@ -162,7 +163,9 @@ class StampSynchronizer(object):
 
     def add_depth(self, stamp_ns, now_ns, depth):
         """Add a depth image; if its stamp goes back, all data from before the time jump is deleted."""
-        newest_ns = self._depths.newest_ns
+        newest_ns, newest = self._depths.newest_ns, next(reversed(self._depths), None)
+        if newest is not None and stamp_ns - newest.stamp_ns > now_ns - newest.arrival_ns + JUMP_NS:
+            self._ahead_ns = newest.stamp_ns, stamp_ns
         if self._depths.add(stamp_ns, now_ns, depth):
             if len(self._cameras) > 1 and self._cameras.newest_ns > stamp_ns + self._length_ns:
                 self._cameras.clear()  # each image has one of its own
@@ -232,9 +235,14 @@ class StampSynchronizer(object):
         self._waiting = waiting
         for boxes, depth, camera in settled:
             if camera is None:
-                self._on_lost(boxes, False)
+                self._on_lost(boxes, self._is_from_before_jump_ahead(boxes.stamp_ns))
             else:
                 self._on_frame(boxes, depth, camera)
+
+    def _is_from_before_jump_ahead(self, stamp_ns):
+        """Whether the depth image of boxes has been deleted because time has just jumped ahead."""
+        before_ns, after_ns = self._ahead_ns
+        return stamp_ns <= before_ns and self._depths.newest_ns <= after_ns + self._length_ns
 
     def _is_next_nearer(self, depth_ns, stamp_ns):
         """Whether the depth image after the one with the stamp `depth_ns` should be nearer, and has not arrived."""

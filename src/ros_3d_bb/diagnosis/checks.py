@@ -9,7 +9,7 @@ from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, LA
 from ros_3d_bb.diagnosis.observations import IMAGE, KEPT, Finding, Role
 from ros_3d_bb.diagnosis.tf_tree import optical_frame_fix, pose_fix, root_of, why_missing
 from ros_3d_bb.diagnosis.topic_faults import (LATE_S, MIN_PAIRED, MIN_RATE_HZ, NO_CLOCK, clock_fault, paired_share,
-                                              silence_fault, span)
+                                              publishers_fault, silence_fault, span)
 
 COLOR, DEPTH, INFO, BOXES2D, BOXES3D, TRACKS = 'color', 'depth', 'info', 'boxes2d', 'boxes3d', 'tracks'
 IMAGES = COLOR, DEPTH, INFO
@@ -39,7 +39,7 @@ def role_named(name, kind):
 
 def findings(seen):
     """Run all checks of an `Observations`. Returns a list of Finding."""
-    checks = (_clock, _images, _camera, _alignment, _encodings, _stamps, _pairs_of_images, _transforms, _mount,
+    checks = (_clock, _publishers, _images, _camera, _alignment, _encodings, _stamps, _pairs_of_images, _transforms, _mount,
               _pairs_of_boxes, _results)
     found = [finding for check in checks for finding in check(seen)]
     return found + list(_nodes(seen, any(finding.fault for finding in found)))
@@ -55,6 +55,14 @@ def _clock(seen):
                       'rosparam set use_sim_time true before the nodes start')
     else:
         yield Finding('time', 'from /clock' if seen.use_sim_time else "the machine's clock")
+
+
+def _publishers(seen):
+    """Report topics and frames that several nodes publish at once, as a driver beside a bag: each looks like a jump."""
+    for topic, nodes in [(stream.topic, stream.senders) for stream in seen.streams.values()] + [
+            ('the frame %s of tf' % frame, nodes) for frame, nodes in sorted(seen.tf_senders.items())]:
+        if nodes:
+            yield Finding('publishers', '', *publishers_fault(topic, nodes))
 
 
 def _images(seen):

@@ -15,10 +15,12 @@ from ros_3d_bb.conversions.camera_msgs import (DEPTH_TOPICS, IMAGE_KINDS, RAW, S
                                                uncompressed)
 from ros_3d_bb.conversions.image_msgs import DEPTH_SCALES, imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, camera_from_msg, time_from
+from ros_3d_bb.core.time_jumps import TimeJumps
 from ros_3d_bb.core.time_sync import JUMP_NS, NS, SAME_NS
 from ros_3d_bb.diagnosis.camera_mount import camera_mount
 from ros_3d_bb.diagnosis.checks import COLOR, DEPTH, INFO, ROLES
 from ros_3d_bb.diagnosis.observations import COMPRESSED_IMAGE, IMAGE, KEPT, Newest, Observations, Stream, TfSeen
+from ros_3d_bb.core.senders import Senders, sender_of
 from ros_3d_bb.diagnosis.tf_tree import links_in
 
 COMPARED_NS, PAIRS = NS // 4, 16  # between two images that are kept and compared; number of those that are kept
@@ -68,6 +70,7 @@ class Observation(object):
         self.role, self.topic, self.newest, self.on_message = role, topic, None, lambda: None
         self._count, self._passed_ns, self._last_ns = 0, 0, None
         self._stamps_ns, self._lags_s = collections.deque(maxlen=KEPT), (None, None)
+        self._senders, self._jumps = Senders(), TimeJumps()
 
     def take(self, message, ros_ns, machine_s=None):
         """Record a message with its arrival in ROS time (0 before the first /clock message) and in machine time."""
@@ -78,14 +81,18 @@ class Observation(object):
         stamp_ns = _stamp_in(message)
         if stamp_ns:
             self._stamps_ns.append(stamp_ns)
-        if stamp_ns and ros_ns:
+        self._senders.add(sender_of(message))
+        if stamp_ns and machine_s is not None:
+            self._jumps.see('ROS time', ros_ns, machine_s)
+            self._jumps.see('stamps', stamp_ns, machine_s)
+        if stamp_ns and ros_ns and not (machine_s is not None and self._jumps.are_recent(machine_s)):
             self._lags_s = (ros_ns - stamp_ns) / NS, None if machine_s is None else machine_s - stamp_ns / NS
         self.on_message()
 
     def stream(self, published_kind, publishers=()):
         rate_hz = (self._count - 1) * NS / self._passed_ns if self._passed_ns else 0.0
         return Stream(self.role, self.topic, published_kind, publishers, self._count, rate_hz, tuple(self._stamps_ns),
-                      *self._lags_s)
+                      *self._lags_s, senders=self._senders.take())
 
     def tf_seen(self, transforms, target_frame, source_frame=''):
         """Look up the pose of the camera in the fixed frame at the stamp of an image. None without images.

@@ -27,6 +27,7 @@ class Publisher(NamedTuple):
 
     node: str
     problem: str = ''  # why it cannot be received here
+    fix: str = ''
 
 
 class Stream(NamedTuple):
@@ -41,6 +42,7 @@ class Stream(NamedTuple):
     stamps_ns: Tuple[int, ...] = ()  # of the messages that have one
     lag_s: Optional[float] = None  # ROS time minus stamp at the arrival of the newest message
     machine_lag_s: Optional[float] = None  # the same by the clock of the machine
+    senders: Tuple[str, ...] = ()  # nodes that publish it at once; empty if there is one
 
 
 class Newest(NamedTuple):
@@ -77,6 +79,7 @@ class Observations(NamedTuple):
     tf: Optional[TfSeen] = None
     use_sim_time: bool = False
     clock_count: int = 0  # number of /clock messages
+    tf_senders: Dict[str, Tuple[str, ...]] = {}  # nodes that publish the same frame of tf at once, by frame
     nodes: dict = {}  # {name: (level, sentence)} from the diagnostics of nodes
     mount: Any = None  # camera_mount.CameraMount of a camera without the pose in tf
     frame_id: str = ''  # of bbox3d_node, which replaces that of the images; empty: none

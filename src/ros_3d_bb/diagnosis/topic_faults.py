@@ -32,9 +32,7 @@ def silence_fault(stream, topics, used=(), seconds=5.0, is_bag=False):
         return 'no messages on %s in the first %.0f s' % (topic, seconds), 'record it from the start'
     for publisher in stream.publishers:
         if publisher.problem:
-            return ('no messages on %s: %s publishes it, but %s' % (topic, publisher.node, publisher.problem),
-                    'set ROS_IP on both machines to the address by which the other one reaches it (or add their names '
-                    'to /etc/hosts) and restart the nodes; if that node has ended: rosnode cleanup')
+            return 'no messages on %s: %s publishes it, but %s' % (topic, publisher.node, publisher.problem), publisher.fix
     names = ', '.join(publisher.node for publisher in stream.publishers) or 'a node'
     return 'no messages on %s for %.0f s, although %s publishes it' % (topic, seconds, names), role.when_silent
 
@@ -86,6 +84,12 @@ def clock_fault(stream, use_sim_time):
     return (fault + 'the clock of this machine',
             'synchronise the clocks of all machines (chrony)'
             + ('; or the preceding nodes take that long' if lag_s > 0 else ''))
+
+
+def publishers_fault(topic, nodes):
+    """Return that several nodes publish a topic, or a frame of tf, and the fix."""
+    return ('%s is published by %s at once' % (topic, ' and '.join(nodes)),
+            'stop all of them but one (rosnode kill NODE), or let them publish other names')
 
 
 def span(seconds):

@@ -103,7 +103,7 @@ class PeopleRemovalNode(object):
                 _fixed_from_sensor, cylinders = around()
                 self._diagnostics.count(name + ' without people')
                 return remover(message, around) if len(cylinders) else message
-            self._diagnostics.warn('no recent tracks', 'no recent tracks: people are not removed')
+            self._tracks.report_missing('people are not removed')
         except tf2_ros.TransformException as error:
             self._diagnostics.warn('no transform', 'no transform from %s to %s: %s; people are not removed from %s'
                                    % (message.header.frame_id, newest.frame_id, error, name))

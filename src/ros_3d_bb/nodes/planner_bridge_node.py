@@ -9,6 +9,7 @@ from std_msgs.msg import Header
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, stamp_of, time_from
 from ros_3d_bb.core.object_classes import read_object_classes
 from ros_3d_bb.core.params import CLASSES_FILE, LARGEST, Param, parameters
+from ros_3d_bb.core.time_jumps import TimeJumps
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
@@ -140,7 +141,7 @@ class PlannerBridgeNode(object):
         self._diagnostics = Diagnostics()
         self._topics = [PlannerTopic(output, self._diagnostics) for output in outputs_from(self._params)]
         self._lock = threading.Lock()
-        self._received = None
+        self._received, self._jumps = None, TimeJumps()
         self._transforms = Transforms(self._params.tf_timeout)
         self._diagnostics.show('tf age', self._transforms.age)
         rospy.on_shutdown(self._empty_all)
@@ -151,6 +152,9 @@ class PlannerBridgeNode(object):
     def _on_tracks(self, message):
         with self._diagnostics.receiving('tracks'):
             received = self._read(message)
+            if received is None:
+                self._diagnostics.count('tracks from before a time jump')
+                return
             with self._lock:
                 self._received = received
                 for topic in self._topics:
@@ -159,9 +163,14 @@ class PlannerBridgeNode(object):
             self._diagnostics.record_latency(message.header.stamp)
 
     def _read(self, message):
-        """Convert a message to `ReceivedTracks`. Raises ValueError if the tracks must not be passed to planners."""
+        """Convert a message to `ReceivedTracks`. Raises ValueError if the tracks must not be passed to planners; returns
+        None if the reason is a jump in time."""
         stamp_ns, now_ns = stamp_of(message), _now_ns()
+        self._jumps.see('ROS time', now_ns)
+        self._jumps.see('stamps', stamp_ns)
         late_s = (now_ns - stamp_ns) / NS
+        if abs(late_s) > self._params.timeout and self._jumps.are_recent():
+            return None
         if abs(late_s) > self._params.timeout:
             raise ValueError('their stamp is %.3f s %s the clock, more than ~timeout (%g s); a bag needs use_sim_time'
                              % (abs(late_s), 'before' if late_s > 0 else 'after', self._params.timeout))

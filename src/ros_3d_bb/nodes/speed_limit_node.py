@@ -101,7 +101,7 @@ class SpeedLimitNode(object):
         """Return the highest safe speed; None without recent tracks."""
         around = self._tracks.around()
         if around is None:
-            self._diagnostics.warn('no recent tracks', 'no recent tracks: the robot stands until there are some')
+            self._tracks.report_missing('the robot stands until there are some')
             return None
         limit = highest_safe_speed(around.tracks, around.age_s, around.robot_from_tracks, velocity, self._safety,
                                    around.pose_age_s)

@@ -4,6 +4,7 @@ import collections
 import tf2_ros
 
 from ros_3d_bb.conversions.perception_msgs import NEWEST, transform_from_msg
+from ros_3d_bb.core.senders import Senders
 
 CACHE_S = 10.0  # tf2 rejects transforms that are older than the newest one of their frame by more
 REJECTED = 2  # transforms in sequence that tf2 rejects after a jump, and not because one is late; chosen
@@ -96,6 +97,13 @@ class TransformBuffer(tf2_ros.BufferCore):
             raise ValueError('tf contains the pose of %s in %s already; one without it expected (--camera-height, '
                              '--camera-pose; camera_height:=, camera_pose:=)' % (frame, target))
         return target, root, target_from_frame.dot(self.lookup(frame, root, NEWEST))
+
+    def senders(self):
+        """{frame: names of the nodes} of the recent frames that several nodes publish at once, see `Senders`."""
+        found = collections.defaultdict(Senders)
+        for transform, authority in list(self._recent):
+            found[_child_of(transform)].add(authority)
+        return {frame: nodes for frame, nodes in ((frame, each.take()) for frame, each in found.items()) if nodes}
 
     def _between(self, target, source):
         return set(path_to_root(self._parents, target)) ^ set(path_to_root(self._parents, source))

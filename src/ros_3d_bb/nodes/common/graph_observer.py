@@ -69,6 +69,7 @@ class GraphObserver(object):
             self._bbox3d_param('depth_scale'), frame_id=frame_id,
             tf=self._observed[DEPTH].tf_seen(self._transforms, target_frame, camera_frame),
             use_sim_time=bool(rospy.get_param('/use_sim_time', False)), clock_count=len(self._clocks),
+            tf_senders=self._transforms.senders(),
             nodes={name: status[:2] for name, status in list(self._statuses.items())},
             edges_fault=self._edges.fault(), depth_is_raw=self._bbox3d_param('depth') == RAW,
             stamp_tolerance_s=self._bbox3d_param('stamp_tolerance'),

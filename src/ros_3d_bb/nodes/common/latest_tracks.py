@@ -6,6 +6,7 @@ import tf2_ros
 
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, stamp_of, tracks_from_msg
 from ros_3d_bb.core.object_classes import read_object_classes
+from ros_3d_bb.core.time_jumps import TimeJumps
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.common.subscribers import subscribe
@@ -47,19 +48,29 @@ class LatestTracks(object):
 
     def __init__(self, diagnostics, timeout_s, on_tracks=lambda _tracks: None):
         self._diagnostics, self._timeout_s, self._on_tracks = diagnostics, timeout_s, on_tracks
-        self._newest = None
+        self._newest, self._jumps = None, TimeJumps()
         subscribe(TRACKS_TOPIC, TrackedObjectArray, self._on_message, 2)
 
     def newest(self):
         """Return the newest Tracks; None if they are too old or the clock went back."""
-        newest = self._newest
+        newest, now_ns = self._newest, rospy.get_rostime().to_nsec()
+        self._jumps.see('ROS time', now_ns)
         if newest is None:
             return None
-        age_s = (rospy.get_rostime().to_nsec() - newest.stamp_ns) / NS
+        age_s = (now_ns - newest.stamp_ns) / NS
         return newest._replace(age_s=max(age_s, 0.0)) if abs(age_s) <= self._timeout_s else None
+
+    def report_missing(self, consequence):
+        """Warn that there are none; shortly after a jump in time, only count it, because those of the new time follow.
+        """
+        if self._jumps.are_recent():
+            self._diagnostics.count('no tracks yet after a time jump')
+        else:
+            self._diagnostics.warn('no recent tracks', 'no recent tracks: ' + consequence)
 
     def _on_message(self, message):
         with self._diagnostics.receiving('tracks'):
+            self._jumps.see('stamps', stamp_of(message))
             tracks = received_tracks(message, self._diagnostics)
             received = Tracks(tracks, stamp_of(message), message.header.frame_id.lstrip('/'))
             self._newest = received

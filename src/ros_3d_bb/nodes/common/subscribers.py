@@ -5,11 +5,15 @@ import time
 import rospy
 from rospy.topics import get_topic_manager
 from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Int32MultiArray
 
 from ros_3d_bb.conversions.camera_msgs import IMAGE_KINDS, info_of_images
+from ros_3d_bb.core.time_jumps import TimeJumps
 from ros_3d_bb.diagnosis.checks import role_named
 from ros_3d_bb.diagnosis.observations import Stream
-from ros_3d_bb.diagnosis.topic_faults import NO_CLOCK, clock_fault, silence_fault
+from ros_3d_bb.core.senders import Senders, sender_of
+from ros_3d_bb.diagnosis.topic_faults import NO_CLOCK, clock_fault, publishers_fault, silence_fault
+from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.common.master import NO_ANSWER, published_topics, publishers_of
 
 # Queue size for messages that are cached until others arrive and must not be lost: this many may arrive at once after
@@ -19,6 +23,7 @@ AT_ONCE = 5  # queue size for messages that are processed directly; limits their
 IMAGE_BUFFER = 2 ** 24  # bytes; if smaller than the images that arrive at once, rospy delivers outdated images
 SMALL_BUFFER = 2 ** 16  # rospy's default
 SILENT_S = 5.0
+ONE_PUBLISHER = Image, CameraInfo, Int32MultiArray, BoundingBox3DArray, TrackedObjectArray  # of one topic
 QUERY_PERIOD_S = 10.0  # between two requests to the master about one topic
 
 _inputs, _lock = [], threading.Lock()  # of the process, which is one node
@@ -31,11 +36,13 @@ class Input(object):
         self.name, self.kind, self.callbacks, self.subscriber = name, kind, [], None
         self.is_irregular = is_irregular
         self.count, self.received_s, self._newest = 0, None, None  # `received_s` on time.monotonic()
+        self.senders, self._jumps = Senders(), TimeJumps()
         self.reported_count = 0  # at the last report of the rate
         self.silence, self.queried_s = '', -QUERY_PERIOD_S  # cause of a silence, and when the master was asked for it
 
     def take(self, message):
-        """Record a message and pass it to the callbacks."""
+        """Record a message and pass it to the callbacks. Its lag is unknown after a jump in time."""
+        self.senders.add(sender_of(message))
         if isinstance(message, rospy.AnyMsg):
             message = _image_in(message)
             if message is None:  # the diagnostics report the type of a topic without messages
@@ -44,7 +51,11 @@ class Input(object):
         self.received_s = time.monotonic()
         header = getattr(message, 'header', None)
         if header is not None:
-            self._newest = header.stamp, rospy.get_rostime(), time.time()
+            ros_time = rospy.get_rostime()
+            self._jumps.see('ROS time', ros_time.to_nsec(), self.received_s)
+            self._jumps.see('stamps', header.stamp.to_nsec(), self.received_s)
+            is_settled = not self._jumps.are_recent(self.received_s)
+            self._newest = (header.stamp, ros_time, time.time()) if is_settled else None
         for callback in list(self.callbacks):
             callback(message)
 
@@ -141,6 +152,9 @@ class InputMonitor(object):
                 fault = clock_fault(each.stream(), not rospy.rostime.is_wallclock())
                 if fault[0]:
                     yield 'clocks', '%s; %s' % fault
+                senders = each.senders.take()
+                if senders and each.kind in ONE_PUBLISHER:
+                    yield 'publishers of ' + each.name, '%s; %s' % publishers_fault(each.subscriber.resolved_name, senders)
 
     def _silence(self, silent, now_s, silent_s):
         """Return why an input is silent. The master is queried at most every QUERY_PERIOD_S per topic.

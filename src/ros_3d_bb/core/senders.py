@@ -1,0 +1,30 @@
+"""Which nodes send the messages on a topic."""
+
+
+class Senders(object):
+    """Nodes that send messages on a topic, or transforms of a frame.
+
+    Several send at once if one of them sends again after another. A node that was restarted under another name, as the
+    player of a bag, only follows the former one.
+    """
+
+    def __init__(self):
+        self._latest, self._nodes, self._alternate = '', set(), False
+
+    def add(self, node):
+        """Record the sender of a message."""
+        if node != self._latest:
+            self._alternate = self._alternate or node in self._nodes
+            self._nodes.add(node)
+            self._latest = node
+
+    def take(self):
+        """Names of the nodes that have sent at once since the last call; empty if there was one at a time."""
+        found = tuple(sorted(self._nodes)) if self._alternate else ()
+        self._nodes, self._alternate = {self._latest}, False
+        return found
+
+
+def sender_of(message):
+    """Name of the node that has sent a received message; empty for a message of a bag."""
+    return getattr(message, '_connection_header', {}).get('callerid', '')
