@@ -26,7 +26,8 @@ def test_a_pause_of_the_machine_or_a_constant_difference_is_no_jump():
 
 
 @pytest.mark.parametrize('sent, expected', [
-    ('aaaa', ''), ('aaabbb', ''), ('abc', ''), ('aabab', 'ab'), ('abca', 'abc'), ('aaab|ba', ''), ('aaab|bab', 'ab'), ('ab|bb|bb', '')])
+    ('aaaa', ''), ('aaabbb', ''), ('abc', ''), ('aabab', 'ab'), ('abca', 'abc'),
+    ('aaab|ba', ''), ('aaab|bab', 'ab'), ('ab|bb|bb', '')])
 def test_nodes_send_at_once_if_one_sends_again_after_another(sent, expected):
     """`|`: they are asked for."""
     senders = Senders()

@@ -105,9 +105,9 @@ def test_boxes_from_before_a_jump_ahead_are_no_fault_of_the_detector(ahead_ns, d
     """As where a simulated scene starts again: the depth images from before are no longer cached."""
     recorder = Recorder()
     recorder.add('camera', None, 0, 'camera')
-    arrivals = sorted([(n * PERIOD, 'depth', n) for n in range(60)] + [(n * PERIOD + 90 * MS, 'boxes', n)
-                                                                       for n in range(60)])
-    for now_ns, kind, number in arrivals:
+    arrivals = [(n * PERIOD + delay_ns, kind, n) for n in range(60) for kind, delay_ns in (('depth', 0),
+                                                                                           ('boxes', 90 * MS))]
+    for now_ns, kind, number in sorted(arrivals):
         recorder.add(kind, number * PERIOD + (ahead_ns if number >= 30 else 0), now_ns, number)
     assert recorder.dropped == dropped
     assert recorder.frames == [(n, n, 'camera') for n in range(60) if n not in dropped]
@@ -151,7 +151,8 @@ SEQUENCES = {
     'a camera is published once, before a time jump':
         ([('camera', 9999), ('depth', 9999), ('depth', 1), ('boxes', 1)], (3, 2, 0)),
     'the depth image was lost': ([('depth', 1), ('boxes', 2), ('depth', 3)], (1, None, None)),
-    'the depth image is no longer cached': ([('depth', 1), ('depth', 20), ('depth', 40), ('boxes', 1)], (3, None, None)),
+    'the depth image is no longer cached':
+        ([('depth', 1), ('depth', 20), ('depth', 40), ('boxes', 1)], (3, None, None)),
     'boxes arrive first after a pause':
         ([('depth', 1), ('boxes', 9999), ('camera', 9999), ('depth', 9999)], (1, 3, 2)),
     'boxes without a stamp, and no depth image': ([('boxes', None)], (0, None, None)),

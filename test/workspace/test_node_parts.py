@@ -31,7 +31,8 @@ IMAGE, UNUSABLE = Image(header=header_at(1000)), Image(header=header_at(1000))
     ('bbox3d_node', (), 'parameter ~stride is 0', '~stride: launch argument bbox3d_params:=FILE'),
     ('people_node', ('tracker_node', 'bbox3d_node'), '~stride is 0', '~stride: launch argument bbox3d_params:=FILE'),
     ('yolov5_node', (), 'no ~weights given', '~weights: launch argument weights:='),
-    ('bbox3d_node', (), 'no ~frame_id', '~frame_id: launch argument frame_id:='), ('doctor', (), '~weights', '~weights')])
+    ('bbox3d_node', (), 'no ~frame_id', '~frame_id: launch argument frame_id:='),
+    ('doctor', (), '~weights', '~weights')])
 def test_a_node_that_cannot_start_names_the_launch_argument(name, parts, fault, place):
     def node():
         raise ValueError(fault)

@@ -163,8 +163,9 @@ class PlannerBridgeNode(object):
             self._diagnostics.record_latency(message.header.stamp)
 
     def _read(self, message):
-        """Convert a message to `ReceivedTracks`. Raises ValueError if the tracks must not be passed to planners; returns
-        None if the reason is a jump in time."""
+        """Convert a message to `ReceivedTracks`. Raises ValueError if the tracks must not be passed to planners;
+        returns None if the reason is a jump in time.
+        """
         stamp_ns, now_ns = stamp_of(message), _now_ns()
         self._jumps.see('ROS time', now_ns)
         self._jumps.see('stamps', stamp_ns)

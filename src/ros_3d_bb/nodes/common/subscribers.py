@@ -152,9 +152,10 @@ class InputMonitor(object):
                 fault = clock_fault(each.stream(), not rospy.rostime.is_wallclock())
                 if fault[0]:
                     yield 'clocks', '%s; %s' % fault
-                senders = each.senders.take()
-                if senders and each.kind in ONE_PUBLISHER:
-                    yield 'publishers of ' + each.name, '%s; %s' % publishers_fault(each.subscriber.resolved_name, senders)
+                senders = each.senders.take() if each.kind in ONE_PUBLISHER else ()
+                if senders:
+                    yield ('publishers of ' + each.name,
+                           '%s; %s' % publishers_fault(each.subscriber.resolved_name, senders))
 
     def _silence(self, silent, now_s, silent_s):
         """Return why an input is silent. The master is queried at most every QUERY_PERIOD_S per topic.
