@@ -39,8 +39,8 @@ def role_named(name, kind):
 
 def findings(seen):
     """Run all checks of an `Observations`. Returns a list of Finding."""
-    checks = (_clock, _publishers, _images, _camera, _alignment, _encodings, _stamps, _pairs_of_images, _transforms, _mount,
-              _pairs_of_boxes, _results)
+    checks = (_clock, _publishers, _images, _camera, _alignment, _encodings, _stamps, _pairs_of_images, _transforms,
+              _mount, _pairs_of_boxes, _results)
     found = [finding for check in checks for finding in check(seen)]
     return found + list(_nodes(seen, any(finding.fault for finding in found)))
 

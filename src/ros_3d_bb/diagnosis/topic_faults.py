@@ -32,7 +32,8 @@ def silence_fault(stream, topics, used=(), seconds=5.0, is_bag=False):
         return 'no messages on %s in the first %.0f s' % (topic, seconds), 'record it from the start'
     for publisher in stream.publishers:
         if publisher.problem:
-            return 'no messages on %s: %s publishes it, but %s' % (topic, publisher.node, publisher.problem), publisher.fix
+            return ('no messages on %s: %s publishes it, but %s' % (topic, publisher.node, publisher.problem),
+                    publisher.fix)
     names = ', '.join(publisher.node for publisher in stream.publishers) or 'a node'
     return 'no messages on %s for %.0f s, although %s publishes it' % (topic, seconds, names), role.when_silent
 

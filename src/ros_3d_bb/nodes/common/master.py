@@ -86,7 +86,7 @@ def _connection_problem(master, node, topic):
         return ('it cannot be reached at %s:%s (%s)' % (address.hostname, address.port, error.strerror or error),
                 REACH_FIX)
     if (uri, topic) not in _types:  # once, as a publisher that is silent keeps the connection
-        with contextlib.suppress(*NO_ANSWER + (ROSHandshakeException, TypeError, ValueError, KeyError)):  # it is ending
+        with contextlib.suppress(ROSHandshakeException, TypeError, ValueError, KeyError, *NO_ANSWER):  # it is ending
             _types[uri, topic] = _published_type(uri, topic)
     return _type_problem(*_types.get((uri, topic), ('', '')))
 
@@ -96,8 +96,9 @@ def _published_type(uri, topic):
     node = xmlrpc.client.ServerProxy(uri, transport=_Transport())
     _code, _text, (_protocol, host, port) = node.requestTopic(rospy.get_name(), topic, [['TCPROS']])
     with contextlib.closing(socket.create_connection((host, port), TIMEOUT_S)) as connection:
+        # under another name: rospy closes the former connection to a subscriber with the same one
         write_ros_handshake_header(connection, {'topic': topic, 'type': '*', 'md5sum': '*',
-                                                'callerid': rospy.get_name()})
+                                                'callerid': rospy.get_name() + '_type'})
         header = read_ros_handshake_header(connection, io.BytesIO(), HEADER_BYTES)
     return header['type'], header['md5sum']
 
@@ -107,8 +108,8 @@ def _type_problem(kind, md5sum):
     if ours is None or ours._md5sum == md5sum:
         return '', ''
     package = kind.partition('/')[0]
-    return ('it has another version of %s (md5sum %s, here %s), which cannot be received' % (kind, md5sum, ours._md5sum),
-            'build the same version of %s on all machines, and restart the nodes' % package)
+    return ('it has another version of %s (md5sum %s, here %s), which cannot be received'
+            % (kind, md5sum, ours._md5sum), 'build the same version of %s on all machines, and restart the nodes' % package)
 
 
 def on_new_master(function):
