@@ -107,9 +107,9 @@ def _type_problem(kind, md5sum):
     ours = get_message_class(kind) if kind else None
     if ours is None or ours._md5sum == md5sum:
         return '', ''
-    package = kind.partition('/')[0]
     return ('it has another version of %s (md5sum %s, here %s), which cannot be received'
-            % (kind, md5sum, ours._md5sum), 'build the same version of %s on all machines, and restart the nodes' % package)
+            % (kind, md5sum, ours._md5sum),
+            'build the same version of %s on all machines, and restart the nodes' % kind.partition('/')[0])
 
 
 def on_new_master(function):
