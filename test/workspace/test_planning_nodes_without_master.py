@@ -213,9 +213,16 @@ def test_a_robot_with_a_pose_of_another_time_stands(age_s, expected):
         robot.send_tf(START_NS)
         assert robot.forwarded(START_NS + int(age_s * NS)) == expected
         assert ('no transform' in robot.counts) == (expected == 0)
-        if age_s > 0:
-            robot.send_tf(START_NS + int(age_s * NS))
-        assert robot.forwarded(START_NS + max(int(age_s * NS), 0) + NS // 100) == 1.0
+        now_ns = START_NS + max(int(age_s * NS), 0) + NS // 100
+        robot.send_tf(now_ns)
+        assert robot.forwarded(now_ns) == 1.0
+
+
+def test_a_pose_of_the_future_is_no_longer_used_when_it_becomes_that_of_the_present():
+    """The odometry, whose machine is 3 s ahead, has ended."""
+    with robot_with() as robot:
+        robot.send_tf(START_NS + 3 * NS)
+        assert {robot.forwarded(START_NS + number * NS // 10) for number in range(50)} == {0.0}
 
 
 def test_a_jump_in_time_is_not_reported_as_missing_tracks():

@@ -65,7 +65,8 @@ class Transforms(object):
         self._wait_s = wait_s
         self.buffer = TransformBuffer()
         self._listener = TransformListener(self.buffer)
-        self._requested, self._explanations = {}, {}  # by (target, source): time; (sentence, time)
+        # By (target, source): time; (sentence, time); stamp of the latest transform, and ROS time since it is known.
+        self._requested, self._explanations, self._newest = {}, {}, {}
 
     def lookup(self, target_frame, source_frame, stamp):
         """Look up `target_from_source` (4, 4) at a stamp.
@@ -93,10 +94,11 @@ class Transforms(object):
 
     def latest(self, target_frame, source_frame, timeout_s):
         """Look up the latest transform, which is that received last after a jump in time, too. Returns it, as `lookup`,
-        and its age in seconds, 0 if it is ahead of ROS time, or only static transforms are between the frames.
+        and its age in seconds, 0 if only static transforms are between the frames. A transform of the future is as old
+        as it is known here.
 
-        Raises tf2_ros.TransformException as `lookup`, and if it is further than ~timeout from ROS time, before or
-        after: the age of a transform of the future is unknown.
+        Raises tf2_ros.TransformException as `lookup`, and if it is older than ~timeout, or further in the future: then
+        its age is unknown.
         """
         target, source = target_frame.lstrip('/'), source_frame.lstrip('/')
         self.buffer.forget_later(target, source)
@@ -104,12 +106,15 @@ class Transforms(object):
         newest = self.buffer.get_latest_common_time(target, source)
         if not newest or target == source:
             return target_from_source, 0.0
-        age_s = (rospy.get_rostime() - newest).to_sec()
-        if abs(age_s) > timeout_s:
-            raise tf2_ros.ExtrapolationException(
-                'the latest one is %.1f s %s ROS time, more than ~timeout (%g s)'
-                % (abs(age_s), 'before' if age_s > 0 else 'after', timeout_s))
-        return target_from_source, max(age_s, 0.0)
+        now = rospy.get_rostime()
+        if self._newest.get((target, source), (None, None))[0] != newest:
+            self._newest[target, source] = newest, now
+        late_s = (now - newest).to_sec()
+        age_s = max(late_s, (now - self._newest[target, source][1]).to_sec())
+        if age_s > timeout_s or late_s < -timeout_s:
+            raise tf2_ros.ExtrapolationException('the latest one is %s, more than ~timeout (%g s)' % (
+                '%.1f s old' % age_s if age_s > timeout_s else '%.1f s after ROS time' % -late_s, timeout_s))
+        return target_from_source, age_s
 
     def close(self):
         """Unsubscribe from tf."""
