@@ -93,6 +93,7 @@ CASES = [
     (sound(depth=image_seen('16UC1', frame_id='depth_optical')), 'alignment', 'frame depth_optical', 'align_depth'),
     (sound(depth=image_seen('16UC1', fault='metres in a 16UC1')), 'depth encoding', 'metres in a 16UC1',
      'depth_scale'),
+    (sound(depth=image_seen('bgr8', fault="has encoding 'bgr8'")), 'depth encoding', 'bgr8', '/compressedDepth'),
     (sound(color=image_seen('yuv422', fault="has encoding 'yuv422'")), 'colour encoding', 'yuv422',
      'rgb8'),
     (with_stream(DEPTH, stamps_ns=(), lag_s=None), 'stamps', 'no stamp (zero)', 'set it to the time'),

@@ -24,6 +24,7 @@ LAYOUTS.update((encoding, ('u2' if encoding.endswith('16') else 'u1', 1))
 COLOR_ENCODINGS = ('rgb8', 'bgr8', 'rgba8', 'bgra8', 'mono8', '8UC1', '8UC3') + tuple(CONVERSIONS)
 # REP 118: depth is in millimetres in 16UC1 (mono16 in Gazebo and some drivers) and in metres in 32FC1.
 DEPTH_SCALES = {'16UC1': 0.001, 'mono16': 0.001, '32FC1': 1.0}
+COMPRESSED_DEPTH = ', as on a topic that ends in /compressedDepth: JPEG changes depth'
 GRID = 16  # rows and columns of the grid of pixels whose median shows the unit of depth
 LEAST_SAMPLES = 8  # with fewer valid pixels the unit is not checked
 NEAREST_M, FARTHEST_M = 0.1, 100.0  # plausible range of the median
@@ -67,7 +68,8 @@ def pixels_from(message, encodings=tuple(LAYOUTS), content='supported'):
     except ValueError as error:
         raise ValueError('%s cannot be decoded: %s' % (name, error))
     if encoding not in encodings:
-        raise ValueError('%s has encoding %.20r; a %s image expected' % (name, encoding, content))
+        raise ValueError('%s has encoding %.20r; a %s image expected%s' % (name, encoding, content, COMPRESSED_DEPTH
+                                                                           if content == 'depth' else ''))
     return pixels, encoding
 
 

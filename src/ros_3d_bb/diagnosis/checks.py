@@ -5,6 +5,7 @@ their unit is not checked.
 """
 from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault, size_fault, target_frame_fault
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, INFO_TOPICS
+from ros_3d_bb.conversions.image_msgs import DEPTH_SCALES
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, LATEST_NS, TRACKS_TOPIC
 from ros_3d_bb.diagnosis.observations import IMAGE, KEPT, Finding, Role
 from ros_3d_bb.diagnosis.tf_tree import optical_frame_fix, pose_fix, root_of, why_missing
@@ -15,6 +16,10 @@ COLOR, DEPTH, INFO, BOXES2D, BOXES3D, TRACKS = 'color', 'depth', 'info', 'boxes2
 IMAGES = COLOR, DEPTH, INFO
 MAX_REPEATED = 0.2  # share of the messages on a topic with the stamp of the one before; chosen
 UNSTAMPED_FIX = 'their publisher must set it to the time at which the image was taken'
+UNIT_FIX = ('correct the driver, or set depth_scale to metres per unit in config/bbox3d.yaml, config/tracker.yaml and, '
+            'for detector:=depth, config/depth_detector.yaml: 1.0 for metres, 0.001 for millimetres')
+NO_DEPTH_FIX = ('pass the topic of depth images in 16UC1 or 32FC1 (camera_depth:=TOPIC); if they are compressed, it ends in '
+                '/compressedDepth: JPEG changes depth')
 CAMERA = 'the camera (roslaunch ros_3d_bb realsense.launch)'
 CAMERA_SILENT = 'is the camera plugged in, the bag still playing (not paused), the network fast enough for images?'
 DETECTOR_SILENT = ('is the detector paused (call its service ~enable with true), still loading its weights, or '
@@ -128,11 +133,10 @@ def _registration_fault(seen):
 
 
 def _encodings(seen):
+    is_depth = seen.depth is not None and seen.depth.message.encoding in DEPTH_SCALES
     for subject, image, fix in (
             ('colour', seen.color, 'set the camera to rgb8 or bgr8'),
-            ('depth', seen.depth, 'correct the driver, or set depth_scale to metres per unit in config/bbox3d.yaml, '
-             'config/tracker.yaml and, for detector:=depth, config/depth_detector.yaml: 1.0 for metres, 0.001 for '
-             'millimetres')):
+            ('depth', seen.depth, UNIT_FIX if is_depth else NO_DEPTH_FIX)):
         if image is not None:
             fact = '%s, %d x %d pixels' % (image.message.encoding, image.message.width, image.message.height)
             yield Finding(subject + ' encoding', fact, image.fault, fix)
