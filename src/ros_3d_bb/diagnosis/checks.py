@@ -18,8 +18,8 @@ MAX_REPEATED = 0.2  # share of the messages on a topic with the stamp of the one
 UNSTAMPED_FIX = 'their publisher must set it to the time at which the image was taken'
 UNIT_FIX = ('correct the driver, or set depth_scale to metres per unit in config/bbox3d.yaml, config/tracker.yaml and, '
             'for detector:=depth, config/depth_detector.yaml: 1.0 for metres, 0.001 for millimetres')
-NO_DEPTH_FIX = ('pass the topic of depth images in 16UC1 or 32FC1 (camera_depth:=TOPIC); of compressed ones, it ends in '
-                '/compressedDepth: JPEG changes depth')
+NO_DEPTH_FIX = ('pass the topic of depth images in 16UC1 or 32FC1 (camera_depth:=TOPIC), which ends in /compressedDepth '
+                'if they are compressed: JPEG changes depth')
 CAMERA = 'the camera (roslaunch ros_3d_bb realsense.launch)'
 CAMERA_SILENT = 'is the camera plugged in, the bag still playing (not paused), the network fast enough for images?'
 DETECTOR_SILENT = ('is the detector paused (call its service ~enable with true), still loading its weights, or '
@@ -64,10 +64,14 @@ def _clock(seen):
 
 def _publishers(seen):
     """Report topics and frames that several nodes publish at once, as a driver beside a bag: each looks like a jump."""
-    for topic, nodes in [(stream.topic, stream.senders) for stream in seen.streams.values()] + [
-            ('the frame %s of tf' % frame, nodes) for frame, nodes in sorted(seen.tf_senders.items())]:
+    published = {}
+    for stream in seen.streams.values():
+        published.setdefault(stream.senders, []).append(stream.topic)
+    for frame, nodes in sorted(seen.tf_senders.items()):
+        published.setdefault(nodes, []).append('the frame %s of tf' % frame)
+    for nodes, names in published.items():
         if nodes:
-            yield Finding('publishers', '', *publishers_fault(topic, nodes))
+            yield Finding('publishers', '', *publishers_fault(names, nodes))
 
 
 def _images(seen):

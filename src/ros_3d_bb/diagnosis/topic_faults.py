@@ -87,9 +87,9 @@ def clock_fault(stream, use_sim_time):
             + ('; or the preceding nodes take that long' if lag_s > 0 else ''))
 
 
-def publishers_fault(topic, nodes):
-    """Return that several nodes publish a topic, or a frame of tf, and the fix."""
-    return ('%s is published by %s at once' % (topic, ' and '.join(nodes)),
+def publishers_fault(names, nodes):
+    """Return that several nodes publish the same topics, or frames of tf, and the fix."""
+    return ('%s publish %s at once' % (' and '.join(nodes), ', '.join(names)),
             'stop all of them but one (rosnode kill NODE), or let them publish other names')
 
 

@@ -155,7 +155,7 @@ class InputMonitor(object):
                 senders = each.senders.take() if each.kind in ONE_PUBLISHER else ()
                 if senders:
                     yield ('publishers of ' + each.name,
-                           '%s; %s' % publishers_fault(each.subscriber.resolved_name, senders))
+                           '%s; %s' % publishers_fault([each.subscriber.resolved_name], senders))
 
     def _silence(self, silent, now_s, silent_s):
         """Return why an input is silent. The master is queried at most every QUERY_PERIOD_S per topic.
