@@ -18,8 +18,8 @@ MAX_REPEATED = 0.2  # share of the messages on a topic with the stamp of the one
 UNSTAMPED_FIX = 'their publisher must set it to the time at which the image was taken'
 UNIT_FIX = ('correct the driver, or set depth_scale to metres per unit in config/bbox3d.yaml, config/tracker.yaml and, '
             'for detector:=depth, config/depth_detector.yaml: 1.0 for metres, 0.001 for millimetres')
-NO_DEPTH_FIX = ('pass the topic of depth images in 16UC1 or 32FC1 (camera_depth:=TOPIC), which ends in /compressedDepth '
-                'if they are compressed: JPEG changes depth')
+NO_DEPTH_FIX = ('pass the topic of depth images in 16UC1 or 32FC1 (camera_depth:=TOPIC); compressed ones end in '
+                '/compressedDepth: JPEG changes depth')
 CAMERA = 'the camera (roslaunch ros_3d_bb realsense.launch)'
 CAMERA_SILENT = 'is the camera plugged in, the bag still playing (not paused), the network fast enough for images?'
 DETECTOR_SILENT = ('is the detector paused (call its service ~enable with true), still loading its weights, or '
