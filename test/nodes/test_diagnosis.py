@@ -3,6 +3,7 @@ because the faults are those of topics, transforms and clocks.
 """
 import argparse
 import subprocess
+import sys
 import threading
 import time
 
@@ -24,6 +25,14 @@ from support.ros import Recorder, wait_until
 
 INFO, KINDS = INFO_TOPICS[0], dict(TYPES, **{BOXES: Int32MultiArray})
 PERIOD_S = 0.1
+OTHER_VERSION = """
+import rospy
+from std_msgs.msg import Int32MultiArray
+Int32MultiArray._md5sum = '0' * 32
+rospy.init_node('other_version')
+rospy.Publisher('%s', Int32MultiArray, queue_size=1)
+rospy.spin()
+"""
 TWO_YEARS_NS = 63000000 * NS
 
 
@@ -153,9 +162,10 @@ def test_renamed_topics_and_unreachable_publishers_are_reported(healthy):
     rospy.Publisher('front/aligned_depth_to_color/image_raw', Image, queue_size=1)
     for topic in (BOXES, DEPTH, INFO):
         healthy.pubs.pop(topic).unregister()
-    rospy.Publisher(BOXES, type('Other', (Int32MultiArray,), {'_md5sum': '0' * 32}), queue_size=1)
+    detector = subprocess.Popen([sys.executable, '-c', OTHER_VERSION % BOXES])
     ghost.registerPublisher('/' + INFO, 'sensor_msgs/CameraInfo', address)
     try:
+        wait_until(lambda: '/' + BOXES in dict(ghost.getPublishedTopics('/')), 'the publisher of 2D boxes')
         output = diagnosed()
         assert 'no publishers on /' + DEPTH in output
         assert 'camera_depth:=/front/aligned_depth_to_color/image_raw' in output
@@ -168,6 +178,7 @@ def test_renamed_topics_and_unreachable_publishers_are_reported(healthy):
         healthy.wait_for_line('bbox3d_node', unreachable)
     finally:
         ghost.unregisterPublisher('/' + INFO, address)
+        detector.kill()
 
 
 def test_the_pipeline_checks_itself_with_check_true(check_output):

@@ -115,6 +115,23 @@ def test_one_late_transform_does_not_replace_the_latest_pose():
         assert transforms.lookup('map', 'base_link', rospy.Time(100))[0, 3] == 0
 
 
+@pytest.mark.parametrize('in_flight_s', [0.05, 5.9])
+def test_a_transform_from_before_a_jump_back_that_arrives_late_is_not_the_latest(in_flight_s):
+    """As at each restart of a bag that is shorter than the cache of tf2, which would keep it until the next one."""
+    with masterless() as connections:
+        transforms, connections.now = Transforms(wait_s=0.0), STAMP + rospy.Duration(5.9)
+        connections.send('/tf', TFMessage([link('map', 'base_link', connections.now)]))
+        connections.now = STAMP
+        connections.send('/tf', TFMessage([link('map', 'base_link', STAMP + rospy.Duration(in_flight_s))]))
+        for number in range(30):
+            connections.now = stamp = STAMP + rospy.Duration(number * 0.1)
+            sent = link('map', 'base_link', stamp)
+            sent.transform.translation.x = number
+            connections.send('/tf', TFMessage([sent]))
+            if number:
+                assert transforms.latest('map', 'base_link', 0.5)[0][0, 3] == number
+
+
 @pytest.mark.parametrize('back_s, is_kept', [(0.02, True), (0.9, True), (3.0, False)])
 def test_transforms_are_kept_when_time_goes_back_by_less_than_a_jump(back_s, is_kept):
     """As with each message of a second publisher of /clock, such as a bag that was recorded with all topics."""

@@ -186,9 +186,10 @@ class PlannerBridgeNode(object):
             try:
                 transforms[frame, latest] = self._transform(frame, latest, header)
             except tf2_ros.TransformException as error:
-                self._diagnostics.warn('no transform', 'no transform from %s to %s at %.3f: %s; nothing is published '
-                                       'in %s, and an empty array after ~timeout'
-                                       % (header.frame_id, frame, header.stamp.to_sec(), error, frame))
+                self._diagnostics.warn_unless(
+                    self._jumps.are_recent(), 'no transform', 'no transform from %s to %s at %.3f: %s; nothing is '
+                    'published in %s, and an empty array after ~timeout'
+                    % (header.frame_id, frame, header.stamp.to_sec(), error, frame))
         return transforms
 
     def _transform(self, frame, latest, header):
@@ -219,11 +220,13 @@ class PlannerBridgeNode(object):
         """Empty the outputs whose tracks are older than ~timeout."""
         with self._diagnostics.rejecting('outputs'), self._lock:
             now_ns = _now_ns()
+            self._jumps.see('ROS time', now_ns)
             for topic in self._topics:
                 if topic.held is not None and not self._is_valid(topic.held, now_ns):
-                    self._diagnostics.warn('outputs emptied', 'no valid tracks for %g s: %s %s until the next ones '
-                                           'arrive' % (self._params.timeout, topic.output.topic,
-                                                       'is emptied' if topic.output.is_emptied else 'is silent'))
+                    self._diagnostics.warn_unless(
+                        self._jumps.are_recent(), 'outputs emptied', 'no valid tracks for %g s: %s %s until the next '
+                        'ones arrive' % (self._params.timeout, topic.output.topic,
+                                         'is emptied' if topic.output.is_emptied else 'is silent'))
                     topic.empty(now_ns)
 
     def _resend(self, _event):

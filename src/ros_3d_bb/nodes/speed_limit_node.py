@@ -101,7 +101,8 @@ class SpeedLimitNode(object):
         """Return the highest safe speed; None without recent tracks."""
         around = self._tracks.around()
         if around is None:
-            self._tracks.report_missing('the robot stands until there are some')
+            if self._tracks.newest() is None:  # otherwise, there is no transform
+                self._tracks.report_missing('the robot stands until there are some')
             return None
         limit = highest_safe_speed(around.tracks, around.age_s, around.robot_from_tracks, velocity, self._safety,
                                    around.pose_age_s)

@@ -63,6 +63,13 @@ class Diagnostics(EventCounter):
         self._warning, self._warned_at = sentence, time.monotonic()
         self._log(event, sentence, WARNING_LASTS_S)
 
+    def warn_unless(self, is_expected, event, sentence):
+        """Warn, or only count the event if it is expected, as for a moment after a jump in time."""
+        if is_expected:
+            self.count(event)
+        else:
+            self.warn(event, sentence)
+
     def show(self, name, text):
         """Add a value to the published status; `text()` is called once per second and returns it."""
         self._shown.append(lambda: [(name, text())])

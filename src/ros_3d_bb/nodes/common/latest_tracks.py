@@ -63,10 +63,7 @@ class LatestTracks(object):
     def report_missing(self, consequence):
         """Warn that there are none; shortly after a jump in time, only count it, because those of the new time follow.
         """
-        if self._jumps.are_recent():
-            self._diagnostics.count('no tracks yet after a time jump')
-        else:
-            self._diagnostics.warn('no recent tracks', 'no recent tracks: ' + consequence)
+        self._diagnostics.warn_unless(self._jumps.are_recent(), 'no recent tracks', 'no recent tracks: ' + consequence)
 
     def _on_message(self, message):
         with self._diagnostics.receiving('tracks'):
@@ -115,6 +112,7 @@ class RobotTracks(LatestTracks):
         try:
             return self._transforms.latest(self._robot_frame, frame_id, self._timeout_s)
         except tf2_ros.TransformException as error:
-            self._diagnostics.warn('no transform', 'no transform from %s to %s: %s; waiting for it'
-                                   % (frame_id, self._robot_frame, error))
+            self._diagnostics.warn_unless(
+                self._transforms.have_jumped(), 'no transform', 'no transform from %s to %s: %s; waiting for it'
+                % (frame_id, self._robot_frame, error))
             return None, 0.0

@@ -8,6 +8,7 @@ import tf2_ros
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.conversions.perception_msgs import check_transforms
+from ros_3d_bb.core.time_jumps import TimeJumps
 from ros_3d_bb.core.time_sync import JUMP_NS
 from ros_3d_bb.diagnosis.tf_tree import links_in, why_missing
 from ros_3d_bb.pipeline.transform_buffer import TransformBuffer
@@ -21,11 +22,12 @@ class TransformListener(object):
     """Add the transforms of tf to a TransformBuffer, and notify the threads that wait for them.
 
     As tf2's listener, it clears the buffer when ROS time jumps back, but not if by less than `JUMP_NS`, as with each
-    message of a second publisher of /clock.
+    message of a second publisher of /clock. Transforms from before the jump, which arrive after it, are left out.
     """
 
     def __init__(self, buffer):
         self.news, self._buffer, self._latest = threading.Condition(), buffer, rospy.get_rostime()
+        self._jumps = TimeJumps()
         self._subscribers = [
             rospy.Subscriber(topic, TFMessage, functools.partial(self._add, add), tcp_nodelay=True)
             for topic, add in (('/tf', buffer.set_transform), ('/tf_static', buffer.set_transform_static))]
@@ -41,18 +43,23 @@ class TransformListener(object):
         except ValueError as error:
             rospy.logwarn_throttle(5.0, 'transforms rejected: %s; waiting for the next' % error)
             return
-        self._clear_after_jump(rospy.get_rostime())
+        now, jumped = rospy.get_rostime(), self.has_jumped()
         for transform in message.transforms:
-            add(transform, message._connection_header.get('callerid', ''))
+            if not (jumped and (transform.header.stamp - now).to_nsec() > JUMP_NS):
+                add(transform, message._connection_header.get('callerid', ''))
         with self.news:
             self.news.notify_all()
 
-    def _clear_after_jump(self, now):
+    def has_jumped(self):
+        """Clear the buffer after a backward jump in time. Returns whether time has jumped a moment ago."""
+        now = rospy.get_rostime()
         with self.news:
+            self._jumps.see('ROS time', now.to_nsec())
             if (self._latest - now).to_nsec() > JUMP_NS:
                 self._buffer.clear()
                 self._latest = now
             self._latest = max(self._latest, now)
+            return self._jumps.are_recent()
 
 
 class Transforms(object):
@@ -101,6 +108,7 @@ class Transforms(object):
         its age is unknown.
         """
         target, source = target_frame.lstrip('/'), source_frame.lstrip('/')
+        self._listener.has_jumped()
         self.buffer.forget_later(target, source)
         target_from_source = self.lookup(target, source, rospy.Time())
         newest = self.buffer.get_latest_common_time(target, source)
@@ -115,6 +123,10 @@ class Transforms(object):
             raise tf2_ros.ExtrapolationException('the latest one is %s, more than ~timeout (%g s)' % (
                 '%.1f s old' % age_s if age_s > timeout_s else '%.1f s after ROS time' % -late_s, timeout_s))
         return target_from_source, age_s
+
+    def have_jumped(self):
+        """Whether time has jumped a moment ago, so that transforms of the new time are awaited."""
+        return self._listener.has_jumped()
 
     def close(self):
         """Unsubscribe from tf."""
