@@ -7,7 +7,8 @@ from hypothesis import given, strategies as st
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.object_classes import PERSON_CLASS
-from ros_3d_bb.estimation.box3d import ImageGeometry, truncated_edges
+from ros_3d_bb.estimation.box3d import (HIDDEN, NO_DEPTH, NO_LAYER, NO_RAY, REPEATED, ImageGeometry, Rejected,
+                                        truncated_edges)
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimate_foreground, estimator_named
 from ros_3d_bb.estimation.depth_samples import nearest_dominant_layer
 from ros_3d_bb.sessions.session_reader import read_depth, read_session
@@ -55,7 +56,7 @@ def test_no_estimate_without_valid_depth(depth, scale_m, dtype):
     for name in ('foreground', 'median'):
         assert not estimator_named(name).sample(image, (0, 0, 64, 48)).valid.any()
         outside = estimate_boxes(flat(2000), [(70, 10, 90, 20)], CAMERA, estimator_named(name))
-        assert estimate_boxes(image, [(0, 0, 64, 48)], CAMERA, estimator_named(name)) == outside == [None]
+        assert estimate_boxes(image, [(0, 0, 64, 48)], CAMERA, estimator_named(name)) == outside == [Rejected(NO_DEPTH)]
 
 
 def foreground(depth, rect, *others, camera=CAMERA):
@@ -102,7 +103,32 @@ def test_foreground_masks_pixels_of_occluders():
     in_front = foreground(depth, near)
     assert in_front.center_m[2] == pytest.approx(2.0 + PERSON_CLASS.axis)
     assert foreground(depth, far, near).center_m[2] == pytest.approx(3.0 + PERSON_CLASS.axis)
-    assert in_front.rect_px == near and foreground(depth, (12, 8, 30, 44), near) is None
+    assert in_front.rect_px == near and foreground(depth, (12, 8, 30, 44), near) == Rejected(REPEATED)
+
+
+def scattered(depth):
+    """Depth everywhere, of no surface."""
+    depth.values[...] = np.random.RandomState(0).randint(1000, 9000, depth.values.shape)
+
+
+def at_the_edge(depth):
+    depth.values[...], depth.values[:, 10:12] = 0, 2500
+
+
+def too_little(depth):
+    depth.values[...], depth.values[20:22, 30:33] = 0, 2500
+
+
+@pytest.mark.parametrize('change, reason', [(scattered, NO_LAYER), (at_the_edge, NO_LAYER), (too_little, NO_DEPTH)])
+def test_the_reason_of_a_rejected_box_is_named(change, reason):
+    depth = flat(5000)
+    change(depth)
+    assert foreground(depth, (10, 4, 50, 44)) == Rejected(reason)
+
+
+def test_a_box_of_which_nearer_objects_show_everything_is_hidden():
+    left, right = (5, 4, 34, 46), (30, 4, 60, 46)
+    assert foreground(flat(2000), (20, 10, 44, 40), left, right) == Rejected(HIDDEN)
 
 
 def test_occluders_of_occluders_mask_pixels():
@@ -135,7 +161,7 @@ def test_depths_beyond_any_camera_are_ignored():
     depth.values[10, 10], depth.values[20, 20] = 1e30, 1e7
     box = foreground(depth, (5, 5, 60, 45))
     assert box.center_m[2] == pytest.approx(2.0 + PERSON_CLASS.axis) and box.support == 1
-    assert foreground(flat(1e-5, 1.0, np.float32), (5, 5, 60, 45)) is None  # less than a millimetre
+    assert foreground(flat(1e-5, 1.0, np.float32), (5, 5, 60, 45)) == Rejected(NO_DEPTH)  # less than a millimetre
 
 
 @pytest.mark.parametrize('name,stride,complaint', [('mean', 20, "estimator is 'mean'"), ('median', 0, 'stride is 0')])
@@ -188,4 +214,4 @@ def test_no_estimate_at_right_angles_to_the_axis_of_a_fisheye(name):
     camera = Camera(640, 480, 150, 150, 319.5, 239.5, 'equidistant', (0, 0, 0, 0))
     estimator, rect = estimator_named(name), (10, 200, 60, 280)
     depth = DepthImage(np.full((480, 640), 2.0), 1.0)
-    assert estimator.estimate(depth, [rect], of(camera), [PERSON_CLASS]) == [None]
+    assert estimator.estimate(depth, [rect], of(camera), [PERSON_CLASS]) == [Rejected(NO_RAY)]

@@ -3,7 +3,7 @@ import pytest
 
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.camera.images import DepthImage
-from ros_3d_bb.estimation.box3d import LEVEL, plausible
+from ros_3d_bb.estimation.box3d import LEVEL, REPEATED, Box3D, Rejected, plausible
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_path
@@ -78,7 +78,7 @@ def estimates(simulators, knows_tilt, least_visible=0.3):
             scene = Scene(simulator, simulator.frame(number))
             people, rects_px = detected_boxes(scene.frame, scene.camera, random, least_visible)
             boxes = scene.boxes(rects_px, knows_tilt=knows_tilt)
-            found += [(person, box, scene) for person, box in zip(people, boxes) if box is not None]
+            found += [(person, box, scene) for person, box in zip(people, boxes) if isinstance(box, Box3D)]
             missed += boxes.count(None)
     return found, missed
 
@@ -138,7 +138,7 @@ def test_a_second_box_of_a_person_is_no_person_on_the_wall(height_m, ahead_m, wi
     x1, y1, x2, y2 = first_px = scene.rects_px[0]
     more_px = int(wider * (x2 - x1))
     second_px = x1 - more_px, y1, x2 + more_px, y1 + int(lower_edge * (y2 - y1))
-    found = [box for box in scene.boxes([first_px, second_px]) if box is not None]
+    found = [box for box in scene.boxes([first_px, second_px]) if isinstance(box, Box3D)]
     assert found and all(abs(box.center_m[2] - scene.depths_m[0]) < 0.3 for box in found)
 
 
@@ -148,8 +148,8 @@ def test_a_second_box_of_a_partly_hidden_person_is_no_person_on_the_wall():
     near_px, (x1, y1, x2, y2) = scene.rects_px
     assert x1 + 20 < near_px[0] < x2 - 10
     boxes = scene.boxes(scene.rects_px + [(x1 - 3, y1 + 5, x2 - 5, (y1 + y2) // 2)])
-    assert [box and box.center_m[2] for box in boxes[:2]] == pytest.approx(scene.depths_m, abs=0.2)
-    assert boxes[2] is None
+    assert [box.center_m[2] for box in boxes[:2]] == pytest.approx(scene.depths_m, abs=0.2)
+    assert boxes[2] == Rejected(REPEATED)
 
 
 @pytest.mark.parametrize('ahead_m,face_m,facing', [(4.2, 0.5, 3.14), (4.2, 0.6, 2.7), (3.0, 0.5, 2.7), (3.0, 0.6, 2.7)])

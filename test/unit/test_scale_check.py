@@ -40,7 +40,7 @@ def test_giants_count_with_any_support():
 
 def boxes_of(depth, rects_px, camera, level_from_camera=LEVEL):
     boxes = estimate_boxes(depth, rects_px, camera, estimator_named('foreground'), level_from_camera)
-    return list(filter(None, boxes))
+    return [box for box in boxes if isinstance(box, Box3D)]
 
 
 def test_the_scale_of_a_session_is_correct(session_folder):

@@ -20,6 +20,7 @@ from ros_3d_bb.bags.process_bag import main, with_params
 from ros_3d_bb.conversions.camera_msgs import START_NS, transform_messages
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, time_from, tracks_from_msg
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.estimation.box3d import NO_DEPTH
 from ros_3d_bb.pipeline.people_pipeline import Settings
 from ros_3d_bb.sessions.session_reader import read_session
 from support.bags import changed_bag, messages_in, scene_bag
@@ -123,6 +124,18 @@ def test_without_transforms_the_summary_names_the_cause(scene, tmp_path):
     assert printed.splitlines()[-1].startswith('no tracks: no transform from camera_color_optical_frame to map')
     found = messages_in(tmp_path / 'out.bag')
     assert '/ros_3d_bb/tracks' not in found and len(found['/ros_3d_bb/bb_3d']) == 15
+
+
+def test_without_positions_the_summary_names_the_reason_of_each_box(tmp_path):
+    def without_depth(topic, message, time):
+        if topic.endswith('aligned_depth_to_color/image_raw'):
+            message.data = bytes(len(message.data))
+        return topic, message, time
+    scene = scene_bag(tmp_path / 'scene.bag', dict(SCENE, duration=0.1), with_boxes=True)
+    path = changed_bag(scene, tmp_path / 'in.bag', without_depth)
+    counts = process_bag(path, str(tmp_path / 'out.bag'), Settings(detector='none')).counts
+    printed = run_tool(path, tmp_path / 'out.bag', '--detector', 'none')
+    assert counts[NO_DEPTH] and printed.splitlines()[-1].endswith(' %d %s' % (counts[NO_DEPTH], NO_DEPTH))
 
 
 def test_images_far_apart_need_the_tolerance_named_by_the_message(tmp_path):

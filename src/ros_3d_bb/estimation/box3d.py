@@ -15,6 +15,12 @@ from ros_3d_bb.core.object_classes import MAX_COORDINATE_M, MAX_SIZE_M, PERSON
 # detectors regress the edge of a truncated person up to 8 pixels inside the image, farther for larger boxes. A person
 # who is not truncated there loses little, because only boxes of less than the usual size are completed.
 BORDER_PX, BORDER_SHARE = 4, 0.02
+# Reasons why a rectangle gets no 3D box, each the event of its counter.
+NO_DEPTH, NO_RAY = 'boxes without depth', 'boxes without a viewing ray'  # of the rectangle, or its lens model
+NO_LAYER = 'boxes without a depth layer'  # what has depth is scattered, or is beside the object
+HIDDEN = 'boxes behind others'  # objects with 3D boxes are in front of all depth
+REPEATED = 'second boxes of an object'
+REASONS = NO_DEPTH, NO_RAY, NO_LAYER, HIDDEN, REPEATED
 LEVEL = np.eye(3)  # of a camera that is held level
 LEVEL_AXES = tuple(map(tuple, LEVEL.tolist()))
 
@@ -63,9 +69,17 @@ class Box3D(NamedTuple):
                 and abs(x_m) < MAX_COORDINATE_M and abs(y_m) < MAX_COORDINATE_M and abs(z_m) < MAX_COORDINATE_M)
 
 
+class Rejected(NamedTuple):
+    """In place of the Box3D of a rectangle without an estimate: the reason, one of `REASONS`."""
+
+    reason: str
+
+    is_plausible = False
+
+
 def plausible(box):
-    """The Box3D if it is plausible; otherwise, and without a box, None."""
-    return box if box is not None and box.is_plausible else None
+    """The Box3D if it is plausible; otherwise, and if the rectangle is Rejected, None."""
+    return box if box.is_plausible else None
 
 
 def truncated_edges(rect_px, area_px):

@@ -10,7 +10,8 @@ import numpy as np
 
 from ros_3d_bb.camera.images import FARTHEST_M
 from ros_3d_bb.core.object_classes import PERSON, ObjectClasses
-from ros_3d_bb.estimation.box3d import LEVEL, Box3D, ImageGeometry, truncated_edges, without_distortion
+from ros_3d_bb.estimation.box3d import (HIDDEN, LEVEL, NO_DEPTH, NO_LAYER, NO_RAY, REPEATED, Box3D, ImageGeometry,
+                                        Rejected, truncated_edges, without_distortion)
 from ros_3d_bb.estimation.depth_samples import (BESIDE_TRUNK_M, BODY_HALF_DEPTH_MM, FEET_M, LEAST_SIZE, LOOKS_DOWN,
                                                 RectSamples, grid_in, level_rays)
 from ros_3d_bb.estimation.median import centred_grid, estimate_median
@@ -59,7 +60,7 @@ def sample_depth(depth, rect_px, grid):
 
 class Estimator(NamedTuple):
     """Pair of functions: `sample(depth, rect_px)` returns the Samples in a rectangle, and `estimate(depth, rects_px,
-    geometry, kinds)` the Box3D or None of each rectangle, whose ObjectClass in `kinds` is that of `classes`.
+    geometry, kinds)` the Box3D or Rejected of each rectangle, whose ObjectClass in `kinds` is that of `classes`.
     """
 
     sample: Any
@@ -103,8 +104,8 @@ def estimate_boxes(depth, rects_px, camera, estimator, level_from_camera=LEVEL, 
 
     Returns
     -------
-    list of Box3D or None
-        In the order of the rectangles; None without an estimate. Not all of them are plausible, see
+    list of Box3D or Rejected
+        In the order of the rectangles; Rejected without an estimate. Not all boxes are plausible, see
         `Box3D.is_plausible`.
     """
     if len(rects_px) == 0:  # most images show no people
@@ -113,7 +114,7 @@ def estimate_boxes(depth, rects_px, camera, estimator, level_from_camera=LEVEL, 
     geometry = ImageGeometry(camera, depth.measured_area(), tuple(map(tuple, level_from_camera.tolist())))
     boxes = estimator.estimate(depth, rects_px, geometry, list(map(estimator.classes.of, labels)))
     for number, label in enumerate(labels):
-        if boxes[number] is not None and label != boxes[number].label:
+        if isinstance(boxes[number], Box3D) and label != boxes[number].label:
             boxes[number] = boxes[number]._replace(label=label)
     return boxes
 
@@ -157,14 +158,17 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
 
     Returns
     -------
-    list of Box3D or None
-        None if less than `LEAST_MEASURED` of the samples have a valid depth and a viewing ray, if the layer contains
-        less than `LEAST_SUPPORT` of those with depth, or less than `LEAST_SHARE` of all, weighted, if the rectangle
-        cannot be undistorted, or if it is a second one of the same object.
+    list of Box3D or Rejected
+        Rejected if less than `LEAST_MEASURED` of the samples have a valid depth and a viewing ray (`NO_DEPTH`), if the
+        layer contains less than `LEAST_SUPPORT` of those with depth, or less than `LEAST_SHARE` of all, weighted
+        (`NO_LAYER`), if the rectangle cannot be undistorted (`NO_RAY`), if all samples are masked (`HIDDEN`), or if it
+        is a second one of the same object (`REPEATED`).
     """
     rects_px = list(map(tuple, rects_px))
     rays = level_rays(geometry.camera, geometry.level_axes)
-    samples, whole_px, truncated, usable, boxes = [], [], [], [], [None] * len(rects_px)
+    samples, whole_px, truncated, usable = [], [], [], []
+    hidden = Rejected(HIDDEN)
+    boxes = [hidden] * len(rects_px)
     for rect_px, kind in zip(rects_px, kinds):
         edges = truncated_edges(rect_px, geometry.area_px)
         of_rect = RectSamples(depth, rect_px, rays, *_expected(kind, edges))
@@ -179,19 +183,26 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     flat_px = without_distortion(whole_px, geometry.camera)
     for number, each in enumerate(samples):
         rows, columns = each.shape
-        has_depth = each.measured >= max(LEAST_MEASURED * rows * columns, 1)
-        if has_depth and math.isfinite(sum(flat_px[number])):
+        if not math.isfinite(sum(flat_px[number])):
+            boxes[number] = Rejected(NO_RAY)
+        elif each.measured < max(LEAST_MEASURED * rows * columns, 1):
+            boxes[number] = Rejected(NO_DEPTH)
+        else:
             usable.append(number)
     overlaps = Overlaps(rects_px, samples, usable, geometry.camera, kinds, truncated)
     while overlaps.pending:
         for number in overlaps.take_foremost():
             seen = _visible_extents(samples[number], flat_px[number], geometry, number in overlaps.repeats)
-            if seen is None:
+            if isinstance(seen, Rejected):
+                boxes[number] = seen
                 continue
             box, axis_m = _box(seen, rects_px[number], truncated[number], kinds[number], geometry)
             if box.is_plausible:
                 overlaps.mask_behind(number, int(1000 * axis_m) + BODY_HALF_DEPTH_MM)
             boxes[number] = box
+    for number in overlaps.repeats:
+        if boxes[number] is hidden:
+            boxes[number] = Rejected(REPEATED)
     return boxes
 
 
@@ -244,7 +255,7 @@ class _Extents(NamedTuple):
 
 
 def _visible_extents(samples, flat_px, geometry, may_repeat):
-    """The _Extents of the object in a rectangle; None without an object of its own.
+    """The _Extents of the object in a rectangle; Rejected without an object of its own.
 
     `may_repeat` is whether it may be the background of another object.
     """
@@ -252,12 +263,12 @@ def _visible_extents(samples, flat_px, geometry, may_repeat):
     count = layer.end - layer.first
     support = count / samples.measured
     if support < LEAST_SUPPORT:
-        return None
+        return Rejected(NO_LAYER)
     on_body = samples.on_body(layer)
     if count < FEW * on_body.size and samples.share(on_body) < LEAST_SHARE:
-        return None
+        return Rejected(NO_LAYER)
     if may_repeat and samples.fill_sides(on_body):
-        return None
+        return Rejected(REPEATED)
     # The mean without the nearest and the farthest tenth is finer than the median, which has the depth resolution.
     inner_mm = layer.ordered_mm[layer.first + count // 10:layer.end - count // 10]
     layer_m = int(inner_mm.sum()) / (1000 * len(inner_mm))

@@ -1,7 +1,7 @@
 """The estimator of the thesis (3.4): medians of the depth samples on a grid. See `box3d` for the conventions."""
 import numpy as np
 
-from ros_3d_bb.estimation.box3d import Box3D, truncated_edges, without_distortion
+from ros_3d_bb.estimation.box3d import NO_DEPTH, NO_RAY, Box3D, Rejected, truncated_edges, without_distortion
 from ros_3d_bb.estimation.depth_samples import BODY_HALF_DEPTH_MM
 
 
@@ -24,15 +24,17 @@ def _ticks(low, high, limit, stride):
 def estimate_median(samples, rect_px, geometry):
     """Estimate a box as in the thesis (3.4.2): per-axis median of the sampled points, size from the box at that depth.
 
-    Returns a Box3D, or None without a valid depth or if the rectangle cannot be undistorted. The tilt of the camera is
-    ignored.
+    Returns a Box3D, or Rejected without a valid depth or if the rectangle cannot be undistorted. The tilt of the camera
+    is ignored.
     """
     camera = geometry.camera
     across, down = camera.rays(samples.columns, samples.rows[:, np.newaxis])
     seen = samples.valid & ~np.isnan(across)  # the distortion model does not define a ray for every pixel
     (flat_px,) = without_distortion([rect_px], camera)
-    if not (np.isfinite(flat_px).all() and seen.any()):
-        return None
+    if not np.isfinite(flat_px).all():
+        return Rejected(NO_RAY)
+    if not seen.any():
+        return Rejected(NO_RAY if samples.valid.any() else NO_DEPTH)
     points = np.stack((across * samples.depth_m, down * samples.depth_m, samples.depth_m), axis=-1)[seen]
     x1, y1, x2, y2 = flat_px
     center_m = np.median(points, axis=0)

@@ -1,7 +1,7 @@
 """Estimation stage: 3D boxes from frames and 2D boxes, shared by bbox3d_node and the pipeline in one process."""
 import functools
 import itertools
-from collections import deque
+from collections import Counter, deque
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +11,7 @@ from ros_3d_bb.core.object_classes import PERSON, PERSON_CLASS, read_object_clas
 from ros_3d_bb.core.params import (CLASSES_FILE, DEPTH, DEPTH_SCALE, IMAGE_ROTATION, LARGEST, STAMP_TOLERANCE, Param,
                                    parameters)
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.estimation.box3d import Rejected
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, error_model_of_param
 
@@ -75,16 +76,17 @@ class EstimationStage(object):
     def estimate(self, frame, boxes2d):
         """Estimate the 3D boxes of one image from its RgbdFrame and Boxes2D.
 
-        A 2D box yields no 3D box if it is empty or reversed, has no depth of its own, or gives an implausible size.
+        A 2D box yields no 3D box if it is empty or reversed, is Rejected, or gives an implausible size.
         Returns a list of `box3d.Box3D`; like the 2D boxes, they belong to the image as received, and its optical frame.
         """
         usable = self._usable_boxes(boxes2d)
         rects_px = list(map(tuple, frame.upright_rects(usable.boxes).tolist()))
         estimates = estimate_boxes(frame.depth, rects_px, frame.camera, self.estimator, _level_rotation(frame.up),
                                    usable.labels)
-        found, boxes3d = [], []
+        found, boxes3d, counts = [], [], Counter()
         for box, score in zip(estimates, usable.scores.tolist()):
-            if box is None:
+            if isinstance(box, Rejected):
+                counts[box.reason] += 1
                 continue
             found.append(box)
             if box.is_plausible:
@@ -94,7 +96,7 @@ class EstimationStage(object):
         factor = self._scale_check.factor(found)
         if factor is not None:
             self._warn_of_scale(factor, frame.depth_unit_m)
-        counts = {'boxes estimated': len(boxes3d), 'boxes without depth': len(estimates) - len(found)}
+        counts['boxes estimated'] = len(boxes3d)
         boxes3d = corrected_boxes(boxes3d, self._error_model, abs(frame.stamp_ns - frame.depth_stamp_ns) / NS)
         if self._error_model is not None and boxes3d:
             outside = [box for box in boxes3d if self._error_model.distance_outside(box.center_m[0], box.center_m[2])]
