@@ -89,7 +89,7 @@ def test_a_person_who_walks_up_to_a_low_camera_and_stops_stays_before_it(speed_m
         return max(3.0 - speed_mps * time_s, 0.8)
     track, = people.play(Tracker(), 10, lambda time_s: [at(x_at(time_s), 0)] if x_at(time_s) > 1.3 else [],
                          view=lambda time_s: low_camera(x_at(time_s) - 0.1))[-1]
-    assert (track.id, track.status) == (1, OCCLUDED) and 0.5 < track.position_m[0] <= 0.9
+    assert (track.id, track.status, track.moving) == (1, OCCLUDED, False) and 0.5 < track.position_m[0] <= 0.9
     assert np.linalg.norm(track.velocity_mps) < 0.05 and 0.5 < track.prediction_m[-1, 0] <= 0.9
 
 

@@ -139,7 +139,7 @@ class Track(object):
     that has the most of the filtered scores `votes`; `score` is the filtered score of the detections, `detection` the
     `Detection.index` in the latest image. `innovation_m` is that of the latest image if its noise is assumed, otherwise
     0. `slow_mps` is the velocity, filtered over `SLOW_S`. `misplaced` are the log odds that outliers have moved this
-    track.
+    track. `is_moving` is whether it moved at the latest detection.
     """
 
     def __init__(self, track_id, measurement, stamp_ns, camera, speed_mps, log_odds):
@@ -325,8 +325,10 @@ def learned_prediction(log_scale, assumed_m, params):
     return params._replace(position_bias=lasting_m, standing_speed=params.standing_speed * math.sqrt(scale))
 
 
-def published(tracks, params):
+def published(tracks, params, moving_speed):
     """Convert tracks to a list of TrackedObject with predictions at constant velocity; `params` are PredictionParams.
+
+    A track that was moving when it was last detected may have been stopped since, see `occlusion.mark_missed`.
 
     People sway as they walk. The predicted velocity v is therefore between that of the filter and the slow one. A low
     velocity is mostly noise of a standing person, so v is scaled by v² / (v² + standing_speed²). The covariance of the
@@ -346,7 +348,8 @@ def published(tracks, params):
     covariances = numbers.take(COVARIANCES, axis=1)
     ahead = (covariances[:, 36:63] + covariances[:, 63:]).reshape(-1, 3, 9)
     predictions_m2 = powers @ ahead + densities[:, None, None] * spread
-    return [TrackedObject(track.id, position_m, size_m, velocity_mps, velocity_mps, track.status, track.is_moving,
+    return [TrackedObject(track.id, position_m, size_m, velocity_mps, velocity_mps, track.status,
+                          track.is_moving and math.hypot(track.state.u, track.state.v) >= STILL_MOVING * moving_speed,
                           track.first_ns, track.last_ns, prediction_m, params.prediction_step, covariance,
                           prediction_m2, track.kind.label, track.score, track.detection)
             for track, position_m, size_m, velocity_mps, prediction_m, covariance, prediction_m2

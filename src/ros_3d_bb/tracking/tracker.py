@@ -161,7 +161,8 @@ class Tracker(object):
         largest_m2 = params.max_position_std ** 2
         tracks = [track for track in sorted(state.tracks, key=BY_ID) if track.is_confirmed and (
             track.status == VISIBLE or track.log_odds >= MIN_TRACK_SCORE and track.state.position_m2 < largest_m2)]
-        return published(tracks, learned_prediction(state.log_noise_scale, noise.noise_unknown, prediction))
+        prediction = learned_prediction(state.log_noise_scale, noise.noise_unknown, prediction)
+        return published(tracks, prediction, params.moving_speed)
 
     def _step(self, before, image, observed_s, assign_id):
         """One cycle of the tracker: see `step` of OutOfSequenceBuffer."""
