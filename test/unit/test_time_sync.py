@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
@@ -77,6 +78,36 @@ def test_a_free_running_depth_camera_is_paired_by_the_nearest_image(offset_ms, d
         recorder.add(kind, stamp_ns, now_ns, number)
     paired = [(boxes, depth) for boxes, depth, _camera in recorder.frames if depth is not None]
     assert paired == [(n, n) for n in range(60) if n % 7 != 3][-len(paired):] and len(paired) >= 49
+
+
+def pairs_ms(colors_ms, depths_ms, late_ms):
+    """Pairs (colour, depth) of stamps; depth arrives `late_ms` after colour."""
+    recorder = Recorder(tolerance_ns=0)
+    recorder.add('camera', None, 0, 'K')
+    events = [(ms, 'boxes', ms) for ms in colors_ms] + [(ms + late_ms, 'depth', ms) for ms in depths_ms]
+    for now_ms, kind, ms in sorted(events):
+        recorder.add(kind, ms * MS, now_ms * MS, ms)
+    recorder.sync.end()
+    return [(color_ms, depth_ms) for color_ms, depth_ms, _camera in recorder.frames if depth_ms is not None]
+
+
+@pytest.mark.parametrize('before_ms,after_ms', [(66, 33), (166, 66)])
+def test_each_image_gets_its_own_depth_though_the_rate_changes(before_ms, after_ms):
+    stamps_ms = list(range(0, 5000, before_ms)) + list(range(5000, 7000, after_ms))
+    assert pairs_ms(stamps_ms, stamps_ms, late_ms=25) == [(ms, ms) for ms in stamps_ms]
+
+
+def test_depth_that_is_nearly_half_a_period_later_is_awaited():
+    stamps_ms = range(0, 3000, 33)
+    assert pairs_ms(stamps_ms, [ms + 15 for ms in stamps_ms], late_ms=5) == [(ms, ms + 15) for ms in stamps_ms]
+
+
+def test_images_whose_depth_is_not_lost_get_their_own():
+    colors_ms = list(range(0, 9000, 33))
+    is_lost = np.random.RandomState(0).rand(len(colors_ms)) < 0.5
+    depths_ms = [ms for ms, lost in zip(colors_ms, is_lost) if not lost]
+    pairs = dict(pairs_ms(colors_ms, depths_ms, late_ms=25))
+    assert all(pairs[ms] == ms for ms in depths_ms)
 
 
 @pytest.mark.parametrize('depth_late_ms', [-8, 0, 8])

@@ -12,6 +12,7 @@ SAME_NS = NS // 200  # the stamps of one image differ by less
 JITTER = 0.05  # variation of the period of images, relative to the period
 JUMP_NS = NS  # a larger deviation from the expected stamp is a jump in time
 ALIVE_NS = NS  # a camera without images for longer is ignored
+RECENT = 10  # colour images whose median period counts; chosen
 LONGEST_LAG_NS = 4 * NS  # a camera that lags by less than this may have the correct time and a slow detector
 NEVER = float('inf')
 
@@ -89,6 +90,11 @@ class MessageCache(object):
         return self.nearest(stamp_ns) or self.nearest(stamp_ns, tolerance_ns or self.half_period_ns)
 
     @property
+    def period_ns(self):
+        """`median_period_ns` of the cached values."""
+        return median_period_ns([entry.stamp_ns for entry in list(self._entries)])
+
+    @property
     def half_period_ns(self):
         """`half_period_of` the cached values."""
         return half_period_of([entry.stamp_ns for entry in list(self._entries)])
@@ -134,6 +140,7 @@ class StampSynchronizer(object):
         self._depths, self._cameras = MessageCache(length_ns), MessageCache(length_ns)
         self._plain_camera = None  # camera_info without a stamp; None if the newest one has a stamp
         self._waiting = []
+        self._boxes_ns = collections.deque(maxlen=RECENT)
         self._end_before_ns = 0  # the last stamp before time jumped back
         self._ahead_ns = 0, 0  # the last stamp before time jumped ahead, and the first one after it
         self._newest_boxes_ns, self._boxes_went_back = 0, False  # whether depth images of the new time are awaited
@@ -198,6 +205,7 @@ class StampSynchronizer(object):
         else:
             self._boxes_went_back = self._boxes_went_back or stamp_ns < self._newest_boxes_ns - self._length_ns
             self._newest_boxes_ns = stamp_ns
+            self._boxes_ns.append(stamp_ns)
             self._waiting.append(entry)
             self._match_waiting(now_ns)
 
@@ -245,10 +253,18 @@ class StampSynchronizer(object):
         return stamp_ns <= before_ns and self._depths.newest_ns <= after_ns + self._length_ns
 
     def _is_next_nearer(self, depth_ns, stamp_ns):
-        """Whether the depth image after the one with the stamp `depth_ns` should be nearer, and has not arrived."""
+        """Whether the depth image after the one with the stamp `depth_ns` should be nearer, and has not arrived.
+
+        It should if half of the period of depth images has passed. If half of the period of boxes has passed, the boxes
+        before were nearer, also where depth images are lost or all rates have just changed.
+        """
         after_ns = stamp_ns - depth_ns
-        # The first comparison saves the median of the periods where stamps are equal, as of most cameras.
-        return after_ns > 0 and depth_ns == self._depths.newest_ns and after_ns > self._depths.half_period_ns
+        # The first comparison saves the medians of the periods where stamps are equal, as of most cameras.
+        if after_ns <= 0 or depth_ns != self._depths.newest_ns:
+            return False
+        boxes_ns = list(self._boxes_ns)
+        periods_ns = self._depths.period_ns, median_period_ns(boxes_ns), median_period_ns(boxes_ns[-2:])
+        return 2 * after_ns > min([period for period in periods_ns if period > 0], default=NEVER)
 
     def _is_past(self, stamp_ns):
         """Whether no depth image can arrive any more for boxes with this stamp."""

@@ -8,13 +8,12 @@ from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, INFO_TOPICS, RAW
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (NEWEST, Boxes2D, boxes2d_from_msg, camera_from_msg, stamp_if_any,
                                                    stamp_of)
-from ros_3d_bb.core.time_sync import NS, StampSynchronizer, half_period_of
+from ros_3d_bb.core.time_sync import NS, RECENT, StampSynchronizer, half_period_of
 from ros_3d_bb.pipeline.depth_registration import DepthRegistration
 
 UNSTAMPED = '2D boxes without a stamp'  # event, reported once
 USED = 'images with a used depth image'  # counter
 TILT_UNKNOWN = 'tilt of the camera unknown'  # event, reported once
-RECENT = 10  # colour images whose median period counts; chosen
 
 
 class RgbdSource(object):
