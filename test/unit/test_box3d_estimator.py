@@ -7,8 +7,8 @@ from hypothesis import given, strategies as st
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.object_classes import PERSON_CLASS
-from ros_3d_bb.estimation.box3d import (HIDDEN, NO_DEPTH, NO_LAYER, NO_RAY, REPEATED, ImageGeometry, Rejected,
-                                        truncated_edges)
+from ros_3d_bb.estimation.box3d import (HIDDEN, NO_DEPTH, NO_LAYER, NO_RAY, REPEATED, UNKNOWN, ImageGeometry,
+                                        Rejected, truncated_edges)
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimate_foreground, estimator_named
 from ros_3d_bb.estimation.depth_samples import nearest_dominant_layer
 from ros_3d_bb.sessions.session_reader import read_depth, read_session
@@ -119,11 +119,33 @@ def too_little(depth):
     depth.values[...], depth.values[20:22, 30:33] = 0, 2500
 
 
-@pytest.mark.parametrize('change, reason', [(scattered, NO_LAYER), (at_the_edge, NO_LAYER), (too_little, NO_DEPTH)])
+def not_measured(depth):
+    """A person in black clothes before a wall."""
+    depth.values[6:44, 18:42] = 0
+
+
+@pytest.mark.parametrize('change, reason', [(scattered, NO_LAYER), (at_the_edge, NO_LAYER), (too_little, NO_DEPTH),
+                                            (not_measured, UNKNOWN)])
 def test_the_reason_of_a_rejected_box_is_named(change, reason):
     depth = flat(5000)
     change(depth)
     assert foreground(depth, (10, 4, 50, 44)) == Rejected(reason)
+
+
+def test_a_person_of_whom_only_head_and_feet_have_depth_is_there():
+    depth = flat(5000)
+    depth.values[5:44, 18:42] = 2500
+    depth.values[14:38, 18:42] = 0
+    assert foreground(depth, (14, 4, 46, 44)).center_m[2] == pytest.approx(2.5 + PERSON_CLASS.axis, abs=0.02)
+
+
+@pytest.mark.parametrize('width_px,height_px,expected', [(24, 34, True), (40, 34, True), (46, 34, False), (20, 46, True)])
+def test_people_are_not_wider_than_their_arms_nor_higher_than_raised_arms(width_px, height_px, expected):
+    """Of people at 3 m, a pixel is 0.05 m."""
+    x, y = 32 - width_px // 2, 24 - height_px // 2
+    depth = flat(6000)
+    depth.values[y:y + height_px, x:x + width_px] = 3000
+    assert foreground(depth, (x, y, x + width_px, y + height_px)).is_plausible == expected
 
 
 def test_a_box_of_which_nearer_objects_show_everything_is_hidden():

@@ -79,7 +79,7 @@ def estimates(simulators, knows_tilt, least_visible=0.3):
             people, rects_px = detected_boxes(scene.frame, scene.camera, random, least_visible)
             boxes = scene.boxes(rects_px, knows_tilt=knows_tilt)
             found += [(person, box, scene) for person, box in zip(people, boxes) if isinstance(box, Box3D)]
-            missed += boxes.count(None)
+            missed += sum(isinstance(box, Rejected) for box in boxes)
     return found, missed
 
 

@@ -23,7 +23,9 @@ UNUSABLE = re.compile(r'[^ -~]|[;,]')  # separators of names in an array of 2D b
 MAX_SIZE_M, MAX_COORDINATE_M = 10.0, 1e8  # of boxes; chosen: objects and maps of no robot are larger
 MAX_CLASSES, MAX_IN_GROUP = 200, 8
 LARGEST_FACTOR = 100.0
-TALLEST_PERSON = 1.6  # relative to the usual height; chosen: a tall person with raised arms
+# Relative to the usual height. Chosen: a tall person with raised arms, or with stretched ones, whose span is about the
+# body height.
+TALLEST_PERSON, WIDEST_PERSON = 1.6, 1.25
 
 
 class ObjectClass(NamedTuple):
@@ -45,8 +47,10 @@ class ObjectClass(NamedTuple):
 
     @property
     def largest_m(self):
-        """Upper bound of width and height, metres; that of people follows from their usual height."""
-        return TALLEST_PERSON * self.height if self.group == PERSON and self.height else MAX_SIZE_M
+        """Upper bounds of width and height, metres; those of people follow from their usual height."""
+        if self.group == PERSON and self.height:
+            return WIDEST_PERSON * self.height, TALLEST_PERSON * self.height
+        return MAX_SIZE_M, MAX_SIZE_M
 
     def axis_behind(self, seen_m):
         """Distance from the visible surface to the vertical axis of an object that appears `seen_m` wide.

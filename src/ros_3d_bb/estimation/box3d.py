@@ -18,9 +18,10 @@ BORDER_PX, BORDER_SHARE = 4, 0.02
 # Reasons why a rectangle gets no 3D box, each the event of its counter.
 NO_DEPTH, NO_RAY = 'boxes without depth', 'boxes without a viewing ray'  # of the rectangle, or its lens model
 NO_LAYER = 'boxes without a depth layer'  # what has depth is scattered, or is beside the object
+UNKNOWN = 'boxes with depth around the object only'  # as of black clothes before a wall
 HIDDEN = 'boxes behind others'  # objects with 3D boxes are in front of all depth
 REPEATED = 'second boxes of an object'
-REASONS = NO_DEPTH, NO_RAY, NO_LAYER, HIDDEN, REPEATED
+REASONS = NO_DEPTH, NO_RAY, NO_LAYER, UNKNOWN, HIDDEN, REPEATED
 LEVEL = np.eye(3)  # of a camera that is held level
 LEVEL_AXES = tuple(map(tuple, LEVEL.tolist()))
 
@@ -42,7 +43,7 @@ class Box3D(NamedTuple):
     source rectangle; `support` is the share 0..1 of the samples with depth that belong to its depth layer;
     `truncated_edges` states whether the left, upper, right and lower edge of the rectangle touch the image border;
     `covariance_m2` (3, 3) is that of the centre, None if unknown; `label` is the class name, and `score` is that of the
-    rectangle, 0..1, 0 if unknown; `largest_m` is the upper bound of width and height.
+    rectangle, 0..1, 0 if unknown; `largest_m` are the upper bounds of width and height.
     """
 
     center_m: np.ndarray
@@ -53,7 +54,7 @@ class Box3D(NamedTuple):
     covariance_m2: Optional[Any] = None
     label: str = PERSON
     score: float = 0.0
-    largest_m: float = MAX_SIZE_M
+    largest_m: Tuple[float, float] = (MAX_SIZE_M, MAX_SIZE_M)
 
     @property
     def truncated(self):
@@ -64,8 +65,8 @@ class Box3D(NamedTuple):
     def is_plausible(self):
         """Whether the centre is nearer than `MAX_COORDINATE_M`, and width and height are between 0 and `largest_m`."""
         x_m, y_m, z_m = self.center_m.tolist()
-        width_m, height_m, _width_m = self.size_m.tolist()
-        return (0 < width_m < self.largest_m and 0 < height_m < self.largest_m
+        (width_m, height_m, _width_m), (widest_m, tallest_m) = self.size_m.tolist(), self.largest_m
+        return (0 < width_m < widest_m and 0 < height_m < tallest_m
                 and abs(x_m) < MAX_COORDINATE_M and abs(y_m) < MAX_COORDINATE_M and abs(z_m) < MAX_COORDINATE_M)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ros_3d_bb.camera.images import FARTHEST_M
 from ros_3d_bb.core.object_classes import PERSON, ObjectClasses
-from ros_3d_bb.estimation.box3d import (HIDDEN, LEVEL, NO_DEPTH, NO_LAYER, NO_RAY, REPEATED, Box3D, ImageGeometry,
+from ros_3d_bb.estimation.box3d import (HIDDEN, LEVEL, NO_DEPTH, NO_LAYER, NO_RAY, REPEATED, UNKNOWN, Box3D, ImageGeometry,
                                         Rejected, truncated_edges, without_distortion)
 from ros_3d_bb.estimation.depth_samples import (BESIDE_TRUNK_M, BODY_HALF_DEPTH_MM, FEET_M, LEAST_SIZE, LOOKS_DOWN,
                                                 RectSamples, grid_in, level_rays)
@@ -267,6 +267,8 @@ def _visible_extents(samples, flat_px, geometry, may_repeat):
     on_body = samples.on_body(layer)
     if count < FEW * on_body.size and samples.share(on_body) < LEAST_SHARE:
         return Rejected(NO_LAYER)
+    if count < on_body.size - samples.measured and samples.surround_unknown(on_body):
+        return Rejected(UNKNOWN)
     if may_repeat and samples.fill_sides(on_body):
         return Rejected(REPEATED)
     # The mean without the nearest and the farthest tenth is finer than the median, which has the depth resolution.

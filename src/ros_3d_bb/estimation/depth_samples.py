@@ -190,6 +190,13 @@ class RectSamples(object):
         """Share of the weight of all samples, with depth or not, that the given samples have."""
         return self._weights.dot(on_body) / np.add.reduce(self._weights)
 
+    def surround_unknown(self, on_body):
+        """Whether the given samples are around something without depth, which may be the object: they fill the outline
+        of the rectangle more than its middle, most of which has no depth."""
+        share, unknown_share = self.share(on_body), self.share(self._depth_m.ravel() <= 0)
+        beside = np.count_nonzero(on_body[self._outline])
+        return unknown_share > share and share * len(self._outline) < beside
+
     def fill_sides(self, on_body):
         """Whether the given samples fill both sides of the rectangle; one is enough if the other hardly has depth."""
         rows, columns = self.shape

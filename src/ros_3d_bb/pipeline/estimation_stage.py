@@ -107,8 +107,8 @@ class EstimationStage(object):
 
     def _warn_of_size(self, box):
         self._events.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and %.3g m '
-                          'high at %.3g m; less than %g m expected; the others in this image are used'
-                          % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2], box.largest_m)))
+                          'high at %.3g m; less than %g and %g m expected; the others in this image are used'
+                          % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2]) + box.largest_m))
 
     def _warn_of_scale(self, factor, unit_m):
         self._events.warn('depth of a wrong scale', 'people of impossible height: depth must be multiplied by %g; '
@@ -130,14 +130,15 @@ def _as_received(box, frame):
     """Convert a Box3D of the upright image to the optical frame and the pixels of the image as received."""
     received_from_upright = turned_rotation(frame.turns).T
     (rect_px,) = frame.received_rects(np.array([box.rect_px])).tolist()
-    width_m, height_m, _width_m = box.size_m
-    size_m = np.array([height_m, width_m, width_m]) if frame.turns % 2 else box.size_m
+    size_m, largest_m = box.size_m, box.largest_m
+    if frame.turns % 2:
+        size_m, largest_m = size_m[[1, 0, 0]], largest_m[::-1]
     covariance_m2 = box.covariance_m2
     if covariance_m2 is not None:
         covariance_m2 = received_from_upright.dot(covariance_m2).dot(received_from_upright.T)
     return box._replace(center_m=received_from_upright.dot(box.center_m), size_m=size_m, rect_px=tuple(rect_px),
                         truncated_edges=box.truncated_edges[frame.turns:] + box.truncated_edges[:frame.turns],
-                        covariance_m2=covariance_m2)
+                        covariance_m2=covariance_m2, largest_m=largest_m)
 
 
 class ScaleCheck(object):
