@@ -45,6 +45,9 @@ ALLOWED = {
         'camera core estimation sessions tracking lab.evaluation lab.evaluation.tracking', 'matplotlib scipy'),
     'ros_3d_bb_lab.evaluation.tracking': (
         'camera core estimation tracking lab.evaluation lab.evaluation.baselines', 'scipy trackeval'),
+    'ros_3d_bb_lab.evaluation.video': (
+        'camera core detection detection.depth tracking visualization lab.evaluation lab.evaluation.baselines '
+        'lab.evaluation.tracking lab.simulation', 'cv2'),
     'ros_3d_bb_lab.evaluation.demo': (
         'conversions core tracking visualization lab.evaluation lab.simulation.ros', 'matplotlib rosbag'),
     'ros_3d_bb_lab.evaluation.navigation': (

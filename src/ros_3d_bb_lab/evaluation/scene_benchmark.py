@@ -62,15 +62,25 @@ def track_frame(tracker, frame, detected, stamp_ns, camera, error_model):
     tracks.
     """
     depth, map_from_camera = DepthImage(frame.depth_mm, 0.001), frame.poses.map_from_camera
+    found = boxes3d_of(detected, depth, camera, map_from_camera, error_model)
+    return tracker.update(stamp_ns, detections_from_boxes(dict(enumerate(found)), map_from_camera),
+                          view_of(depth, camera, map_from_camera, frame.camera))
+
+
+def boxes3d_of(detected, depth, camera, fixed_from_camera, error_model=None):
+    """The list of plausible `box3d.Box3D` of the Detections in an image, as of bbox3d_node."""
     rects_px = np.rint(detected.boxes).astype(int)
     usable = (rects_px[:, :2] < rects_px[:, 2:]).all(axis=1)
     estimated = estimate_boxes(depth, list(map(tuple, rects_px[usable].tolist())), camera,
                                estimator_named('foreground'),
-                               level_from_camera=level_rotation(map_from_camera[2, :3]))
-    found = corrected_boxes([box._replace(score=score) for box, score in zip(estimated, detected.scores[usable])
-                             if plausible(box)], error_model)
-    view = CameraView(map_from_camera, camera, frame.camera, functools.partial(depths_towards, camera, depth))
-    return tracker.update(stamp_ns, detections_from_boxes(dict(enumerate(found)), map_from_camera), view)
+                               level_from_camera=level_rotation(fixed_from_camera[2, :3]))
+    return corrected_boxes([box._replace(score=score) for box, score in zip(estimated, detected.scores[usable])
+                            if plausible(box)], error_model)
+
+
+def view_of(depth, camera, fixed_from_camera, name):
+    """The CameraView of an image of the camera with this name."""
+    return CameraView(fixed_from_camera, camera, name, functools.partial(depths_towards, camera, depth))
 
 
 def depth_detector(simulator):

@@ -4,7 +4,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject, prediction_times_s
+from ros_3d_bb.tracking.types import NOT_DETECTED, OCCLUDED, VISIBLE, TrackedObject, prediction_times_s
 
 COUNTS_HZ = 30.0  # the unit of Norfair's lifetimes is one image at this rate
 PREDICTION_TIME_S, PREDICTION_STEP_S = 2.0, 0.25
@@ -57,7 +57,7 @@ class Norfair(object):
         if self._now_ns is not None:
             period = max(1, int(round((stamp_ns - self._now_ns) / NS * COUNTS_HZ)))
         self._now_ns = stamp_ns
-        seen = [self._detection(detection.position_m[np.newaxis, :2], data=(stamp_ns, detection))
+        seen = [self._detection(np.array([detection.position_m[:2]], float), data=(stamp_ns, detection))
                 for detection in detections]
         return [self._published(thing) for thing in self._tracker.update(seen, period=period)]
 
@@ -67,7 +67,9 @@ class Norfair(object):
         position_m = np.append(thing.estimate[0], detection.position_m[2])
         velocity_mps = np.append(thing.filter.x[2:4].ravel() * self._settings.rate_hz, 0)
         times_s = prediction_times_s(PREDICTION_TIME_S, PREDICTION_STEP_S)
+        is_detected = last_ns == self._now_ns
         return TrackedObject(thing.id, position_m, detection.size_m, velocity_mps, velocity_mps,
-                             VISIBLE if last_ns == self._now_ns else OCCLUDED,
+                             VISIBLE if is_detected else OCCLUDED,
                              bool(np.linalg.norm(velocity_mps) >= MOVING_MPS), first_ns, last_ns,
-                             position_m + times_s[:, np.newaxis] * velocity_mps, PREDICTION_STEP_S)
+                             position_m + times_s[:, np.newaxis] * velocity_mps, PREDICTION_STEP_S,
+                             detection=detection.index if is_detected else NOT_DETECTED)

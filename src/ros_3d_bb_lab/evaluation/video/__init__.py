@@ -1,0 +1,1 @@
+"""Benchmark of the pipeline on RGB-D videos with marked people."""
