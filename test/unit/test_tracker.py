@@ -234,6 +234,21 @@ def test_new_parameters_apply_from_the_next_image_on_and_tracks_are_kept():
     assert ids(play(tracker, 1, standing((3, 0)), start_s=3)[-1]) == [number + 1]
 
 
+@pytest.mark.parametrize('first', ['hidden', 'whole'])
+def test_the_height_of_a_person_whose_legs_are_hidden_is_that_of_the_person(first):
+    """A table hides the lower half for some seconds, once at the start. A person nearby keeps another ID."""
+    def walk(time_s):
+        is_hidden = (time_s < 2 if first == 'hidden' else 2 <= time_s < 6)
+        y = 0.3 * time_s - 1
+        return [at(4, y)._replace(position_m=np.array([4, y, 1.3]), size_m=np.array([0.5, 0.5, 0.8]))
+                if is_hidden else at(4, y), at(4, 2.5)]
+
+    published = play(Tracker(), 9, walk, rate_hz=2.5)
+    assert all_ids(published) == {1, 2}
+    heights_m = [objects[0].size_m[2] for objects in published[8 if first == 'hidden' else 2:]]
+    assert all(1.45 < height_m < 1.75 for height_m in heights_m) and heights_m[-1] > 1.6
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize('slope', [-0.1, 0.05, 0.1])
 @pytest.mark.parametrize('cut,height', [(['top'], 1.7), (['bottom'], 1.7), (['top', 'bottom'], 0.6)])

@@ -7,14 +7,14 @@ from scipy.optimize import linear_sum_assignment
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.kalman_filter import as_outlier, weighted
-from ros_3d_bb.tracking.track import MIN_TRACK_SCORE, Track, log_odds_of, log_odds_of_arrival
+from ros_3d_bb.tracking.track import LEGS_M, MIN_TRACK_SCORE, Track, log_odds_of, log_odds_of_arrival
 
 RECENT_NS = 6 * NS // 10  # tracks matched less than this ago are associated before the others; chosen
 UNSURE_SHARE = 0.1  # upper bound of the new-target density, relative to the peak density of the detection; chosen
 HEAD_SIGMAS = 2.0  # standard deviation of the head top relative to that of the height; chosen: the camera tilts
 # Cost of a box whose top matches but whose height does not, as its legs are occluded; and if its lower end is so much
 # higher than the feet that it is hardly another person. Chosen: heights of people differ by less.
-HIDDEN_FEET_COST, HIDDEN_LEGS_COST, LEGS_M = 4.0, 1.0, 0.2
+HIDDEN_FEET_COST, HIDDEN_LEGS_COST = 4.0, 1.0
 CROWD = 200  # pairs from which on arrays are faster than numbers; measured with `./run bench speed`
 # Of the birth of tracks. All are chosen; `./run bench tracking` and `./run bench scenes` show the effect of others.
 RECENTLY_MATCHED_NS = NS // 2  # no track starts near a track that was matched less than this ago
@@ -163,7 +163,7 @@ def height_cost(track, measurement, sigma_m):
     top_cost = (higher_m / (HEAD_SIGMAS * sigma_m)) ** 2 / 2
     if not track.lower.hits or is_bottom_cut or track.lower.was_cut(track.last_ns):
         return top_cost
-    hidden_cost = HIDDEN_LEGS_COST if height_m - seen_m - higher_m > LEGS_M else HIDDEN_FEET_COST
+    hidden_cost = HIDDEN_LEGS_COST if abs(height_m - seen_m - higher_m) > LEGS_M else HIDDEN_FEET_COST
     return min(((height_m - seen_m) / sigma_m) ** 2 / 2, top_cost + hidden_cost)
 
 
