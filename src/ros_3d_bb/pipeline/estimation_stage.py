@@ -11,10 +11,11 @@ from ros_3d_bb.core.object_classes import PERSON, PERSON_CLASS, read_object_clas
 from ros_3d_bb.core.params import (CLASSES_FILE, DEPTH, DEPTH_SCALE, IMAGE_ROTATION, LARGEST, STAMP_TOLERANCE, Param,
                                    parameters)
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.box3d import Rejected
+from ros_3d_bb.estimation.box3d import REASONS, Rejected
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, error_model_of_param
 
+REJECTIONS = REASONS  # events of 2D boxes without a 3D box
 # Check of the scale of depth images.
 LATEST_PEOPLE = 20  # people that must agree
 LEAST_SUPPORT = 0.3  # boxes with less are often those of other objects

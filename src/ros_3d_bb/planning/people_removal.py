@@ -27,7 +27,7 @@ def cylinders_of(tracks, ahead_s, margin_m):
             x, y, z = position_after(track, ahead_s)
             std_m = np.sqrt(np.maximum(np.linalg.eigvalsh(covariances_after(track, [ahead_s])[0, :2, :2]), 0)[-1])
             half_m = track.size_m[2] / 2
-            low_m = z + half_m - max(PERSON_CLASS.largest_m, track.size_m[2])
+            low_m = z + half_m - max(PERSON_CLASS.largest_m[1], track.size_m[2])
             rows.append((x, y, track.size_m[0] / 2 + margin_m + std_m, low_m - margin_m, z + half_m + margin_m))
     return np.reshape(rows, (-1, 5))
 
