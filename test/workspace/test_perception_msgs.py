@@ -82,6 +82,9 @@ def test_class_names_keep_what_the_array_can_carry():
     (boxes2d_from_msg, Int32MultiArray(data=[1] * 4004), '1001 2D boxes'),
     (camera_from_msg, CameraInfo(width=640, height=480), 'it is empty'),
     (camera_from_msg, CameraInfo(width=640, height=480, K=[0, 0, 320, 0, 610, 240, 0, 0, 1]), 'fx=0'),
+    (camera_from_msg, CameraInfo(width=640, height=480, K=[600, 0, 700, 0, 600, 240, 0, 0, 1]), 'principal point'),
+    (camera_from_msg, CameraInfo(width=640, height=480, K=[3600, 0, 320, 0, 3600, 240, 0, 0, 1]), 'view is 10.2'),
+    (camera_from_msg, CameraInfo(width=640, height=480, K=[60, 0, 320, 0, 60, 240, 0, 0, 1]), 'view is 158.8'),
     (stamp_of, BoundingBox3DArray(header=Header(frame_id='a')), "BoundingBox3DArray of frame 'a' has no stamp"),
     (stamp_of, BoundingBox3DArray(header=header_at(2 ** 31 * NS)), 'year 2038')])
 def test_messages_are_rejected(convert, message, reason):

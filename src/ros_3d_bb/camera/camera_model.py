@@ -12,6 +12,9 @@ from ros_3d_bb.camera.distortion import checked_distortion, distort, undistort
 
 OPTICAL_ROTATION = (-0.5, 0.5, -0.5, 0.5)  # quaternion of an optical frame whose z axis is the body's x axis (REP 103)
 
+# Plausible fields of view along the longer side of the image, degrees: RGB-D cameras have 55 (Kinect) to 120 (Azure).
+VIEWS_DEG = 20.0, 150.0
+
 
 class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float), ('fy', float), ('cx', float),
                                    ('cy', float), ('distortion_model', str), ('distortion', Tuple[float, ...])])):
@@ -70,6 +73,19 @@ class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float
         if not self.distortion_model:
             return pixels
         return self.deproject(pixels, 1.0)[..., :2] * (self.fx, self.fy) + (self.cx, self.cy)
+
+
+def check_intrinsics(camera):
+    """Raise ValueError if the intrinsics cannot be those of a camera with images of this size, but belong to images of
+    another size, for example: positions would be wrong by a factor.
+    """
+    if not (0 <= camera.cx <= camera.width and 0 <= camera.cy <= camera.height):
+        raise ValueError('the principal point (%.0f, %.0f) of K is outside of the image of %d x %d pixels; the '
+                         'calibration of images of this size expected' % (camera[4:6] + camera[:2]))
+    view = np.degrees(2 * np.arctan(np.divide(camera[:2], camera[2:4]) / 2)).max()
+    if not VIEWS_DEG[0] <= view <= VIEWS_DEG[1]:
+        raise ValueError('the field of view is %.1f degrees by K (focal length %.0f) and the image size %d x %d; %g to '
+                         '%g degrees expected' % ((view, camera.fx) + camera[:2] + VIEWS_DEG))
 
 
 def transform_from(translation, quaternion):

@@ -10,7 +10,7 @@ from geometry_msgs.msg import PoseWithCovariance
 from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 
 from ros_3d_bb import msg
-from ros_3d_bb.camera.camera_model import Camera, transform_from
+from ros_3d_bb.camera.camera_model import Camera, check_intrinsics, transform_from
 from ros_3d_bb.core.object_classes import MAX_COORDINATE_M, MAX_SIZE_M, PERSON, label_fault, score_fault, usable_label
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import Box3D
@@ -177,18 +177,21 @@ def camera_from_msg(message):
     belongs to: K is that of the full resolution, of which `roi` and `binning` are a part.
 
     realsense2_camera labels the inverse Brown-Conrady model of librealsense as plumb_bob; the two differ by a few
-    hundredths of a pixel. Raises ValueError if K is zero, as for an uncalibrated camera, or as `Camera`.
+    hundredths of a pixel. Raises ValueError if K is zero, as for an uncalibrated camera, or does not belong to images
+    of that size, or as `Camera`.
     """
     roi = message.roi
+    size = message.width, message.height
     part = (roi.x_offset, roi.y_offset, roi.width or message.width, roi.height or message.height)
     binning = message.binning_x or 1, message.binning_y or 1
-    return _camera_of(part, binning, tuple(message.K), message.distortion_model, tuple(message.D))
+    return _camera_of(size, part, binning, tuple(message.K), message.distortion_model, tuple(message.D))
 
 
 @functools.lru_cache(maxsize=16)  # cameras send their calibration with each image
-def _camera_of(part, binning, matrix, distortion_model, distortion):
+def _camera_of(size, part, binning, matrix, distortion_model, distortion):
     if not any(matrix):
         raise ValueError('it is empty (all of K is zero): the driver does not know the calibration of the camera')
+    check_intrinsics(Camera(*size, matrix[0], matrix[4], matrix[2], matrix[5]))
     (left, top, width, height), (binning_x, binning_y) = part, binning
     return Camera(width // binning_x, height // binning_y, matrix[0] / binning_x, matrix[4] / binning_y,
                   (matrix[2] - left) / binning_x, (matrix[5] - top) / binning_y, distortion_model, distortion)
