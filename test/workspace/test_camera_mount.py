@@ -233,7 +233,7 @@ def test_yolov5_sees_upright_images_once_tf_is_known(turns):
     received = np.ascontiguousarray(turned_image(image, -turns % 4))
     message = fill_image(Image(header=Header(stamp=time_from(NS), frame_id='optical')), received, 'rgb8')
     camera_from_floor = np.linalg.inv(mounted_camera(1.0, 0.2, turns))
-    transforms = type('Transforms', (), {'lookup': lambda *_arguments: camera_from_floor})()
+    transforms = mock.Mock(lookup=lambda *_arguments: camera_from_floor)
     rotation = CameraRotation(Yolov5NodeParams(), transforms, lambda: known.append(True))
     assert rotation.turns('optical') == turns and rotation.turns('optical') == turns and known == [True]
     found = Detections(np.array([[1.0, 2.0, 4.0, 9.0]]), np.array([0.9]), np.array([0]))

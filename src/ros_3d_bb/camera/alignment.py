@@ -10,9 +10,9 @@ LOOKS_UP = 0.85  # z component of a viewing direction from which on it is none, 
 SAME_PX = 1.0  # intrinsics that differ by less count as equal: half a pixel is 1 cm at 6 m
 ALIGN = ('start the camera with realsense.launch, or realsense2_camera with align_depth:=true, and use '
          'camera/aligned_depth_to_color/image_raw, or pass depth:=raw, which registers raw depth')
-POSE = ('set it to a frame whose z axis points up (map, odom), and publish the pose of the camera in that frame; the '
-        'launch arguments camera_height:=1.2 camera_tilt:=0.1 (process_bag: --camera-height 1.2 --camera-tilt 0.1) do '
-        'so for a camera alone')
+POSE = ('set it to a frame whose z axis points up (map, odom), and publish the pose of the camera in that frame; for a '
+        'camera alone, pass its height and tilt (camera_height:=, camera_tilt:=; process_bag: --camera-height, '
+        '--camera-tilt)')
 
 # Comparison of edges. Zoom of depth about the middle of the image, and shift of points at 1 m, in image widths.
 ZOOMS, SHIFTS = np.linspace(0.55, 1.8, 26), np.linspace(-0.095, 0.095, 39)
@@ -29,6 +29,14 @@ def size_fault(color, width, height):
     if (width, height) == color[:2]:
         return ''
     return 'the depth image has %d x %d pixels, the colour camera %d x %d' % ((width, height) + color[:2])
+
+
+def info_size_fault(camera, width, height, info_topic):
+    """Compare the size of a colour image, in pixels, with that of its camera_info."""
+    if (width, height) == camera[:2]:
+        return ''
+    return ('the colour image has %d x %d pixels, its camera_info on %s is for %d x %d: remap the camera_info of this '
+            'image' % (width, height, info_topic, camera.width, camera.height))
 
 
 def intrinsics_fault(color, depth):
@@ -77,8 +85,8 @@ class EdgeComparison(object):
 
     Where depth jumps, colour usually changes. The share of the depth edges at which it does is compared with the share
     for depth that is enlarged and seen from beside, for a grid of both. Depth that is not aligned has a clear maximum
-    elsewhere on this grid. Only images in which something has moved are used: in a single one, edges may agree by
-    chance. In a bare room there are no edges, and there is no answer.
+    elsewhere on this grid, and aligned depth one here. Only images in which something has moved are used: in a single
+    one, edges may agree by chance. In a bare room there are no edges, and there is no answer.
     """
 
     def __init__(self):
@@ -98,16 +106,18 @@ class EdgeComparison(object):
         self._hits, self._count = self._hits + hits, self._count + count
 
     def fault(self):
-        """Return a sentence if the edges of depth and colour disagree, '' otherwise."""
+        """Return a sentence if the edges of depth and colour disagree, '' if they agree, and None if the images do not
+        show it."""
         if self._images < MIN_IMAGES:
-            return ''
+            return None
         shares = self._hits / np.maximum(self._count, 1)
         shares[self._count < 0.5 * self._count.max()] = 0  # outside of the image
         zoom, shift = np.abs(ZOOMS - 1).argmin(), np.abs(SHIFTS).argmin()
         aligned = shares[zoom - 1:zoom + 2, shift - 1:shift + 2].max()
         best_zoom, best_shift = np.unravel_index(shares.argmax(), shares.shape)
-        if shares.max() - aligned < max(MIN_BETTER, MIN_BETTER_STDS * shares.std()):
-            return ''
+        clear = max(MIN_BETTER, MIN_BETTER_STDS * shares.std())
+        if shares.max() - aligned < clear:
+            return '' if aligned - shares.mean() > clear else None
         return ('the edges of depth and colour disagree: they fit if depth is enlarged %.2f times and shifted by '
                 '%.0f %% of the image width at 2 m' % (ZOOMS[best_zoom], 100 * SHIFTS[best_shift] / 2))
 

@@ -79,7 +79,8 @@ class RgbdFrame(NamedTuple):
     depth_unit_m: float  # metres per unit of the received depth image
     color: Optional[np.ndarray] = None  # RGB (height, width, 3), uint8
     turns: int = 0  # clockwise quarter turns from the received to the upright image
-    camera_from_floor: Optional[np.ndarray] = None  # (4, 4), optical frame of the upright image from ~floor_frame
+    camera_from_floor: Optional[np.ndarray] = None  # (4, 4), optical frame of the upright image from one with z up
+    is_floor_known: bool = True  # whether this is ~floor_frame, in which the height of the floor is known
 
     @property
     def up(self):

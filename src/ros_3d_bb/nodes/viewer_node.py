@@ -14,7 +14,7 @@ from std_srvs.srv import SetBool, Trigger, TriggerResponse
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
-from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, NEWEST, boxes2d_from_msg,
+from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, boxes2d_from_msg,
                                                    camera_from_msg, stamp_if_any, stamp_of, time_from, usable_boxes3d)
 from ros_3d_bb.core.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameters
 from ros_3d_bb.core.time_sync import NS, arrival_clock_ns
@@ -24,6 +24,7 @@ from ros_3d_bb.nodes.common.label import Label
 from ros_3d_bb.nodes.common.startup import read_params
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscribe_camera_info
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
+from ros_3d_bb.pipeline.transform_buffer import upright_transform
 from ros_3d_bb.sessions.burst import Burst
 from ros_3d_bb.sessions.snapshots import ColorImage, Snapshots
 from ros_3d_bb.sessions.session_writer import append, remove
@@ -230,7 +231,7 @@ class ViewerNode(object):
         if self._transforms is None:
             return None
         try:
-            return self._transforms.lookup(frame_id, self._params.floor_frame, NEWEST)[:3, 2]
+            return upright_transform(self._transforms, self._params.floor_frame, frame_id)[1][:3, 2]
         except tf2_ros.TransformException:  # bbox3d_node reports it
             return None
 

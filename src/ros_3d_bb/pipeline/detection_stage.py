@@ -6,11 +6,12 @@ import tf2_ros
 from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.camera.images import AUTO, turned_boxes, turned_image, turns_for
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_rgb
-from ros_3d_bb.conversions.perception_msgs import NEWEST, stamp_of
+from ros_3d_bb.conversions.perception_msgs import stamp_of
 from ros_3d_bb.core.params import (DEPTH, DEPTH_SCALE, ENABLED, IMAGE_ROTATION, PUBLISH_EMPTY, STAMP_TOLERANCE, Param,
                                    parameters)
 from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.depth.ground_plane import floor_from_transform
+from ros_3d_bb.pipeline.transform_buffer import upright_transform
 
 
 @parameters()
@@ -58,9 +59,9 @@ def detect_in_color(detector, message, turns=0):
 class CameraRotation(object):
     """Quarter turns that make the images of one camera upright, from ~image_rotation or tf.
 
-    The transform is looked up in `transforms`, as for `tracking_stage.TrackingStage`, until it is available, and not
-    again: the camera is fixed to the robot. It is not used if ~image_rotation is given, or no ~floor_frame. `on_known`
-    is called once no further lookups are necessary.
+    The transform is looked up in `transforms`, as for `tracking_stage.TrackingStage`, until that from ~floor_frame is
+    available, and not again: the camera is fixed to the robot. It is not used if ~image_rotation is given, or no
+    ~floor_frame. `on_known` is called once no further lookups are necessary.
     """
 
     def __init__(self, params, transforms, on_known=lambda: None):
@@ -74,11 +75,14 @@ class CameraRotation(object):
         """Clockwise quarter turns of the images, whose header has this frame; 0 while they are unknown."""
         if self._turns is None:
             try:
-                camera_from_floor = self._transforms.lookup(self._params.frame_id or frame_id,
-                                                            self._params.floor_frame, NEWEST)
+                floor_frame, camera_from_floor = upright_transform(self._transforms, self._params.floor_frame,
+                                                                   self._params.frame_id or frame_id)
             except tf2_ros.TransformException:  # reported by the estimation stage, which needs the same transform
                 return 0
-            self._turns = turns_for(AUTO, camera_from_floor[:3, 2])
+            turns = turns_for(AUTO, camera_from_floor[:3, 2])
+            if floor_frame != self._params.floor_frame:  # it may still arrive
+                return turns
+            self._turns = turns
             self._on_known()
         return self._turns
 
@@ -99,7 +103,7 @@ class DepthDetectionStage(object):
     def detect(self, frame):
         """Return the Detections in the received image of an RgbdFrame; None while the floor is unknown."""
         floor = None  # the detector fits it
-        if frame.camera_from_floor is not None:
+        if frame.camera_from_floor is not None and frame.is_floor_known:
             base_from_floor = transform_from((0, 0, self._params.floor_height), (0, 0, 0, 1))
             floor = floor_from_transform(frame.camera_from_floor.dot(base_from_floor))
         detections = self._detector.detect(frame.color, frame.depth, frame.camera, floor)

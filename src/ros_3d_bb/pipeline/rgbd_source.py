@@ -1,19 +1,21 @@
 """Source of the frames of one RGB-D camera: pairs its messages by stamp, and registers and turns the images."""
 import tf2_ros
 
-from ros_3d_bb.camera.alignment import ALIGN, size_fault
+from ros_3d_bb.camera.alignment import ALIGN, info_size_fault, size_fault
 from ros_3d_bb.camera.images import RgbdFrame, turns_for
 from ros_3d_bb.camera.registration import RegisteredDepth
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, INFO_TOPICS, RAW
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
-from ros_3d_bb.conversions.perception_msgs import (NEWEST, Boxes2D, boxes2d_from_msg, camera_from_msg, stamp_if_any,
+from ros_3d_bb.conversions.perception_msgs import (Boxes2D, boxes2d_from_msg, camera_from_msg, stamp_if_any,
                                                    stamp_of)
 from ros_3d_bb.core.time_sync import NS, RECENT, StampSynchronizer, half_period_of
 from ros_3d_bb.pipeline.depth_registration import DepthRegistration
+from ros_3d_bb.pipeline.transform_buffer import upright_transform
 
 UNSTAMPED = '2D boxes without a stamp'  # event, reported once
 USED = 'images with a used depth image'  # counter
 TILT_UNKNOWN = 'tilt of the camera unknown'  # event, reported once
+TILT_FROM_ROOT = 'tilt of the camera from the root of tf'  # event, reported once
 
 
 class RgbdSource(object):
@@ -63,10 +65,9 @@ class RgbdSource(object):
     def add_boxes(self, message, now_ns):
         """Add 2D boxes, a std_msgs/Int32MultiArray."""
         boxes2d = boxes2d_from_msg(message)
-        if boxes2d.stamp_ns is None and UNSTAMPED not in self._events.counts:
-            self._events.note(UNSTAMPED, 'the 2D boxes have no stamp: each array is paired with the depth image that '
-                              'arrived nearest to %.3f s before it (~assumed_delay)'
-                              % (self._sync.assumed_delay_ns / NS))
+        if boxes2d.stamp_ns is None:
+            self._note_once(UNSTAMPED, 'the 2D boxes have no stamp: each array is paired with the depth image that '
+                            'arrived nearest to %.3f s before it (~assumed_delay)' % (self._sync.assumed_delay_ns / NS))
         self._events.count('arrays of 2D boxes')
         self._sync.add_boxes(boxes2d.stamp_ns, now_ns, boxes2d)
 
@@ -84,19 +85,20 @@ class RgbdSource(object):
         Raises ValueError if an image cannot be read, the colour image has another size than its camera_info, or the
         depth image has another size than the camera or cannot be registered.
         """
-        received = imgmsg_to_depth(depth_msg, self._params.depth_scale, check_unit=True)
-        depth, frame_id = self._aligned(received, depth_msg.header.frame_id, camera)
         depth_stamp_ns = depth_msg.header.stamp.to_nsec()
         if isinstance(trigger, Boxes2D):
             color, size, stamp_ns = None, trigger.image_size, trigger.stamp_ns or depth_stamp_ns
         else:
             color = imgmsg_to_rgb(trigger)
             size, stamp_ns = color.shape[1::-1], trigger.header.stamp.to_nsec()
-        if size not in (None, (camera.width, camera.height)):
-            raise ValueError('the colour image has %d x %d pixels, its camera_info on %s is for %d x %d: remap the '
-                             'camera_info of this image' % (size + (self._info_topic, camera.width, camera.height)))
+        fault = '' if size is None else info_size_fault(camera, *size, self._info_topic)
+        if fault:  # before depth is compared with the camera, too
+            raise ValueError(fault)
+        received = imgmsg_to_depth(depth_msg, self._params.depth_scale, check_unit=True)
+        depth, frame_id = self._aligned(received, depth_msg.header.frame_id, camera)
+        camera_from_floor, is_floor_known = self._camera_from_floor(frame_id)
         frame = RgbdFrame(stamp_ns, depth_stamp_ns, frame_id, camera, depth, received.scale_m, color,
-                          camera_from_floor=self._camera_from_floor(frame_id))
+                          camera_from_floor=camera_from_floor, is_floor_known=is_floor_known)
         return frame.turned(turns_for(self._params.image_rotation, frame.up))
 
     def _aligned(self, depth, depth_frame, camera):
@@ -111,22 +113,31 @@ class RgbdSource(object):
         return depth, self._params.frame_id or depth_frame
 
     def _camera_from_floor(self, frame_id):
-        """Return the transform (4, 4) from ~floor_frame to the optical frame; None if it is unknown.
+        """Return the transform (4, 4) to the optical frame from ~floor_frame, or from the root of tf without it, and
+        whether it is that from ~floor_frame; None and False if it is unknown.
 
         The latest transform is used: the camera is fixed to the robot, so no wait for the image stamp is necessary.
         """
-        if self._transforms is None or not self._params.floor_frame:
-            return None
+        wanted = self._params.floor_frame
+        if self._transforms is None or not wanted:
+            return None, False
         try:
-            return self._transforms.lookup(frame_id, self._params.floor_frame, NEWEST)
+            floor_frame, camera_from_floor = upright_transform(self._transforms, wanted, frame_id)
         except tf2_ros.TransformException as error:
-            if TILT_UNKNOWN not in self._events.counts:
-                self._events.note(TILT_UNKNOWN, 'the tilt of the camera is unknown, as there is no transform from %s '
-                                  'to %s: %s; positions are estimated as if it were level, and the detector depth fits '
-                                  'the floor to the depth image; set ~floor_frame to a frame of tf whose z axis points '
-                                  'up, such as map'
-                                  % (self._params.floor_frame, frame_id, error))
-            return None
+            self._note_once(TILT_UNKNOWN, 'the tilt of the camera is unknown, as there is no transform from %s to %s: '
+                            '%s; positions are estimated as if it were level, and the detector depth fits the floor to '
+                            'the depth image; set ~floor_frame to a frame of tf whose z axis points up, such as map'
+                            % (wanted, frame_id, error))
+            return None, False
+        if floor_frame != wanted:
+            self._note_once(TILT_FROM_ROOT, 'there is no transform from %s (~floor_frame) to %s: the tilt of the '
+                            'camera is that in %s, the root of its tree, whose z axis must point up, and the detector '
+                            'depth fits the floor to the depth image' % (wanted, frame_id, floor_frame))
+        return camera_from_floor, floor_frame == wanted
+
+    def _note_once(self, event, sentence):
+        if event not in self._events.counts:
+            self._events.note(event, sentence)
 
     def _on_frame(self, trigger, depth, camera):
         """Pass matched messages on, but only once if a depth image is nearest to several colour images: positions have

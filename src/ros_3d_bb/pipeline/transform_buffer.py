@@ -1,8 +1,10 @@
 """tf2 buffer that accepts transforms again after a backward jump in time."""
 import collections
 
+import numpy as np
 import tf2_ros
 
+from ros_3d_bb.camera.alignment import viewing_fault
 from ros_3d_bb.conversions.perception_msgs import NEWEST, transform_from_msg
 from ros_3d_bb.core.senders import Senders
 
@@ -17,6 +19,23 @@ def path_to_root(parents, frame):
     while path[-1] in parents and parents[path[-1]] not in path:
         path.append(parents[path[-1]])
     return path
+
+
+def upright_transform(transforms, floor_frame, camera_frame):
+    """Return a frame whose z axis points up, and the latest transform (4, 4) from it to a camera: `floor_frame`, or,
+    without a transform from it, the root of the tree of the camera, such as map or odom of a robot without base_link.
+
+    Raises tf2_ros.TransformException if there is none: an optical frame as the root does not point up. `transforms` is
+    as for `tracking_frame.TrackingFrame`.
+    """
+    try:
+        return floor_frame, transforms.lookup(camera_frame, floor_frame, NEWEST)
+    except tf2_ros.TransformException:
+        root = transforms.ancestors(camera_frame.lstrip('/'))[-1]
+        camera_from_root = transforms.lookup(camera_frame, root, NEWEST)
+        if viewing_fault(root, np.linalg.inv(camera_from_root)):
+            raise
+        return root, camera_from_root
 
 
 class TransformBuffer(tf2_ros.BufferCore):
