@@ -18,7 +18,8 @@ def box_of(height_m, rect_px=STANDING_PX, support=0.8, cut_bottom=False):
 
 
 @pytest.mark.parametrize('height_m,factor', [
-    (8.5, 0.2), (9.6, 0.2), (17.0, 0.1), (1700.0, 0.001), (0.34, 5), (0.28, 5), (0.17, 10), (4.2, 0.4), (0.7, 2.4),
+    (8.5, 0.2), (9.6, 0.2), (6.8, 0.25), (5.5, 0.25),
+    (17.0, 0.1), (1700.0, 0.001), (0.34, 5), (0.28, 5), (0.17, 10), (4.2, 0.4), (0.7, 2.4),
     (0.9, None), (1.15, None), (1.7, None), (2.3, None)])
 def test_an_impossible_height_gives_the_factor(height_m, factor):
     check = ScaleCheck()

@@ -6,6 +6,8 @@ import pytest
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
+from ros_3d_bb.camera.images import mounted_camera
+from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.image_msgs import fill_image
 from ros_3d_bb.conversions.perception_msgs import (boxes2d_to_msg, boxes3d_to_msg, camera_from_msg, header_of,
                                                    time_from, usable_boxes3d)
@@ -13,11 +15,13 @@ from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import NO_DEPTH, REASONS
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
-from ros_3d_bb.pipeline.rgbd_source import RgbdSource
+from ros_3d_bb.pipeline.rgbd_source import TILT_FROM_ROOT, TILT_UNKNOWN, RgbdSource
+from ros_3d_bb.pipeline.transform_buffer import TransformBuffer
 
 HEADER = Header(stamp=time_from(1000 * NS), frame_id='camera')
 CAMERA_INFO = CameraInfo(header=HEADER, width=640, height=480, K=[614.7, 0, 319.2, 0, 614.8, 242.1, 0, 0, 1])
 PERSON_PX, PERSON_M = (60, 150, 160, 460), 3.0
+TALL_AT_M = 3.4  # distance at which the person is 1.71 m tall
 NEAR_PX = (230, 0, 640, 480)  # directly in front of the camera, too near for depth: the wall behind is measured
 MODELS = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.pardir, 'config', 'error_models')
 
@@ -73,6 +77,21 @@ def test_each_image_has_the_tilt_of_the_camera_at_its_time():
         run.add_boxes([PERSON_PX])
     lengths_m = [box.center_m[2] for box in run.boxes3d]
     assert lengths_m[0] == lengths_m[1] == lengths_m[3] != lengths_m[2]
+
+
+def test_without_floor_frame_the_tilt_is_that_in_the_root_of_tf(events):
+    """Of a robot without base_link: the same positions as with the root as ~floor_frame. A level camera differs."""
+    link, = transform_messages(time_from(NS), [('odom', 'camera', mounted_camera(1.0, 0.4, 0))])
+    transforms, lengths_m = TransformBuffer(), []
+    transforms.set_transform_static(link, '')
+    for params, known in ((Bbox3dParams(), transforms), (Bbox3dParams(floor_frame='odom'), transforms),
+                          (Bbox3dParams(floor_frame=''), None)):
+        run = Estimation(params, events, known)
+        run.add_depth(scene(6.0))
+        run.add_boxes([PERSON_PX])
+        lengths_m.append(run.boxes3d[0].center_m[2])
+    assert lengths_m[0] == lengths_m[1] != lengths_m[2]
+    assert events.counts[TILT_FROM_ROOT] == 1 and TILT_UNKNOWN not in events.counts
 
 
 @pytest.mark.parametrize('image_size, found', [(None, 1), ((640, 480), 1), ((320, 240), 0)])
@@ -155,13 +174,13 @@ def test_each_rejected_box_is_counted_under_its_reason(events):
     assert [events.counts.get(event, 0) for event in ('boxes estimated',) + REASONS] == [1, 1, 0, 0, 0, 0, 1]
 
 
-@pytest.mark.parametrize('units_per_m,depth_scale,reported', [(5000, 0.0, '0.0002'), (1000, 0.0, None),
-                                                              (5000, 0.0002, None)])
+@pytest.mark.parametrize('units_per_m,depth_scale,reported', [
+    (5000, 0.0, '0.0002'), (4000, 0.0, '0.00025'), (1000, 0.0, None), (5000, 0.0002, None)])
 def test_depth_of_a_wrong_scale_is_reported_with_the_correct_one(units_per_m, depth_scale, reported, events):
     run = Estimation(Bbox3dParams(depth_scale=depth_scale), events)
     for number in range(30):
         header = Header(stamp=time_from((1000 + number) * NS), frame_id='camera')
-        values = (scene(wall_m=5.0) * units_per_m).astype(np.uint16)
+        values = (scene(wall_m=5.0, person_m=TALL_AT_M) * units_per_m).astype(np.uint16)
         run.add_depth(values, header, '16UC1')
         run.add_boxes([PERSON_PX], header=header)
     assert events.counts.get('depth of a wrong scale', 0) == (reported is not None)
@@ -169,7 +188,7 @@ def test_depth_of_a_wrong_scale_is_reported_with_the_correct_one(units_per_m, de
         assert not run.boxes3d and events.counts['boxes of impossible size'] > 25
         assert 'depth_scale: %s ' % reported in events.sentences['depth of a wrong scale']
     else:
-        assert len(run.boxes3d) > 25 and run.boxes3d[0].center_m[2] == pytest.approx(PERSON_M, abs=0.1)
+        assert len(run.boxes3d) > 25 and run.boxes3d[0].center_m[2] == pytest.approx(TALL_AT_M, abs=0.1)
 
 
 def params(model, estimator):

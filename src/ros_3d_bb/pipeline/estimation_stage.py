@@ -21,8 +21,9 @@ LATEST_PEOPLE = 20  # people that must agree
 LEAST_SUPPORT = 0.3  # boxes with less are often those of other objects
 LEAST_ASPECT = 2.5  # height / width of the 2D box of a person who stands; less for seated or hidden people
 HEIGHTS_M = (0.8, 2.4)  # plausible: a child below a camera whose tilt of 45 degrees is unknown, and a tall adult
-COMMON_FACTORS = np.array([0.001, 0.01, 0.1, 0.2, 5, 10, 100, 1000])  # 0.2: 5000 units per metre, as in TUM RGB-D
-NEAR_FACTOR = 1.4  # ratio of a factor and a common one that it stands for
+# 0.2: 5000 units per metre, as in TUM RGB-D; 0.25: 4000, of a RealSense L515
+COMMON_FACTORS = np.array([0.001, 0.01, 0.1, 0.2, 0.25, 5, 10, 100, 1000])
+COMMON_HEIGHTS_M = (1.3, 1.95)  # with a common factor: adults, who measure less if they are partly hidden; chosen
 # A camera that is fixed to the robot has the same tilt in each image.
 _level_rotation = functools.lru_cache(maxsize=16)(level_rotation)
 
@@ -171,8 +172,9 @@ class ScaleCheck(object):
             return None
         self._heights_m.clear()
         factor = PERSON_CLASS.height / median_m
-        ratios = np.abs(np.log(COMMON_FACTORS / factor))
-        return float(COMMON_FACTORS[ratios.argmin()] if ratios.min() < np.log(NEAR_FACTOR) else '%.2g' % factor)
+        common = float(COMMON_FACTORS[np.abs(np.log(COMMON_FACTORS / factor)).argmin()])
+        is_common = COMMON_HEIGHTS_M[0] <= common * median_m <= COMMON_HEIGHTS_M[1]
+        return common if is_common else float('%.2g' % factor)
 
 
 def _shows_standing_person(box):
