@@ -18,7 +18,7 @@ from ros_3d_bb.conversions.image_msgs import imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg, stamp_of,
                                                    tracks_from_msg, transform_from_msg)
 from ros_3d_bb.core.atomic_file import atomic_write, check_writable
-from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.core.time_sync import NS, half_period_of
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb.visualization.image_overlay import draw_boxes, draw_caption
 from ros_3d_bb_lab.evaluation.clear_mot import Moment, score, table_of_people
@@ -79,12 +79,26 @@ def read_recording(bag):
     frames = set(message.header.frame_id for by_stamp in (truth, tracks) for message in by_stamp.values())
     if len(frames) > 1:
         raise ValueError('truth and tracks have the frames %s; one frame expected' % ', '.join(sorted(frames)))
+    of_image = _tracks_of_images(sorted(truth), tracks) if truth else tracks
     moments = [Moment(stamp_ns, tracks_from_msg(truth[stamp_ns]) if truth else [],
-                      tracks_from_msg(tracks[stamp_ns]) if stamp_ns in tracks else [])
+                      tracks_from_msg(of_image[stamp_ns]) if stamp_ns in of_image else [])
                for stamp_ns in sorted(truth or tracks)]
-    answered = len(set(truth or tracks) & set(tracks))
+    answered = len(of_image)
     return Recording(moments, bool(truth), answered, boxes, np.array(robot).reshape(-1, 2),
                      max(1, len(topics_of_cameras(bag, COLOR_TOPIC)), len(boxes_topics)))
+
+
+def _tracks_of_images(stamps_ns, tracks):
+    """Return {stamp of an image: message of tracks}, given the messages by their stamps: those of depth images, which
+    may be within half a period of that of colour, as for `time_sync.StampSynchronizer`. Each message is used once."""
+    of_image = {stamp_ns: tracks[stamp_ns] for stamp_ns in stamps_ns if stamp_ns in tracks}
+    others, tolerance_ns = set(tracks) - set(of_image), half_period_of(stamps_ns)
+    for stamp_ns in sorted(set(stamps_ns) - set(of_image)):
+        nearest_ns = min(others, key=lambda other_ns: abs(other_ns - stamp_ns), default=None)
+        if nearest_ns is not None and abs(nearest_ns - stamp_ns) <= tolerance_ns:
+            of_image[stamp_ns] = tracks[nearest_ns]
+            others.remove(nearest_ns)
+    return of_image
 
 
 def table_of_tracks(moments):
