@@ -5,11 +5,14 @@ import pytest
 
 from ros_3d_bb.camera.alignment import frames_fault, intrinsics_fault
 from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.camera.images import DepthImage
+from ros_3d_bb.camera.images import DepthImage, mounted_camera
 from ros_3d_bb.conversions.image_msgs import units_fault
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.diagnosis.checks import BOXES2D, BOXES3D, COLOR, DEPTH, INFO, TRACKS, findings
+from ros_3d_bb.detection.depth.ground_plane import CameraPose
+from ros_3d_bb.diagnosis.camera_mount import CameraMount
+from ros_3d_bb.diagnosis.checks import findings
 from ros_3d_bb.diagnosis.observations import Newest, Observations, Publisher, Role, Stream, TfSeen
+from ros_3d_bb.diagnosis.roles import BOXES2D, BOXES3D, COLOR, DEPTH, INFO, TRACKS
 from ros_3d_bb.diagnosis.tf_tree import Link, links_in, why_missing
 from ros_3d_bb.diagnosis.topic_faults import other_topic, paired_share
 
@@ -24,6 +27,7 @@ ROLES = {key: Role(title, 'camera/' + key, kind, argument, 'the source', 'wake i
          for key, title, kind, argument in KINDS}
 LINKS = {'odom': Link('map', 990, 1010), 'base_link': Link('odom', 990, 1010), 'camera_link': Link('base_link', 0, 0),
          'optical': Link('camera_link', 0, 0)}
+FLOOR_FROM_CAMERA = mounted_camera(0.26, 0.0, 0)
 INFO_SEEN = Newest(SimpleNamespace(header=SimpleNamespace(frame_id='optical')), CAMERA)
 
 
@@ -76,6 +80,11 @@ def test_no_frame_of_the_robot_is_proposed_for_the_images():
     assert 'static_transform_publisher' in fault.fix and 'frame_id' not in fault.fix
 
 
+def with_tf_clock(lags_s, in_time):
+    tf = TfSeen('map', 'optical', 1000.0, LINKS, '', lags_s=lags_s, in_time=in_time)
+    return sound(tf=tf)
+
+
 def moved(stamps_ns, by_s):
     return tuple(stamp_ns + int(by_s * NS) for stamp_ns in stamps_ns)
 
@@ -113,13 +122,14 @@ CASES = [
     (sound(tf=TfSeen('map', 'rgb_optical_frame', 1000.0, {'rgb_optical_frame': Link('arm', 0, 0)}, '', 'is not')),
      'transforms', 'is not', 'X Y Z -1.5708 0 -1.5708 arm rgb_optical_frame'),
     (without_tf(*LINKS), 'transforms', 'tf has no frames', 'robot_state_publisher'),
-    (without_tf(*LINKS), 'transforms', 'tf has no frames',
-     'static_transform_publisher 0 0 1.2 -1.5708 0 -1.6708 map optical, and pass floor_frame:=map'),
-    (sound(tf=TfSeen('optical', 'optical', 1000.0, {}, '')), 'transforms', 'is an optical frame', 'camera_height:=1.2'),
+    (without_tf(*LINKS), 'transforms', 'tf has no frames', 'frame_id:=optical'),
+    (without_tf(*LINKS)._replace(mount=CameraMount(8, {0: 9}, 0, CameraPose(0.27, 0.01, 0.0))), 'transforms',
+     'tf has no frames', 'camera_height:=0.27 camera_tilt:=0.01'),
+    (sound(tf=TfSeen('optical', 'optical', 1000.0, {}, '')), 'transforms', 'is an optical frame', 'camera_height:='),
     (sound(tf=TfSeen('rgb_optical_frame', 'optical', 1000.0, LINKS, '')), 'transforms', 'is an optical frame',
      'frame_world:=map'),
     (sound(tf=TfSeen('map', 'depth_optical_frame', 1000.0, {'depth_optical_frame': Link('rgb_optical_frame', 0, 0)},
-                     'the error of tf2')), 'transforms', 'tf has no frame map', 'map rgb_optical_frame'),
+                     'the error of tf2')), 'transforms', 'tf has no frame map', 'frame_id:=rgb_optical_frame'),
     (without_tf('odom'), 'transforms', 'tf has no frame map', 'frame_world:=odom'),
     (without_tf('camera_link'), 'transforms', 'tf has two trees',
      'static_transform_publisher X Y Z YAW PITCH ROLL base_link camera_link'),
@@ -129,6 +139,15 @@ CASES = [
      'the transform from base_link to odom ends 5.000 s before', 'publisher of base_link'),
     (without_tf(odom=Link('map', 1003, 1010)), 'transforms', 'the transform from odom to map begins 3.000 s after',
      'clocks'),
+    (with_tf_clock({'odom': 0.01, 'base_link': 0.8}, 0.0), 'transforms', 'from base_link to odom are 0.8 s before',
+     'clocks'),
+    (with_tf_clock({'odom': -3.0, 'base_link': 0.0}, 1.0), 'transforms', 'from odom to map are 3.0 s after', 'clocks'),
+    (sound(color=image_seen('rgb8', width=320)), 'camera', 'the colour image has 320 x 480 pixels', 'calibration'),
+    (sound(mount=CameraMount(8, {0: 0}, 0, CameraPose(1.04, 0.0, 0.0), {0.2: 16, 0.25: 15}),
+           depth=image_seen('16UC1')._replace(converted=DepthImage(np.zeros((4, 4), np.uint16), 0.001)),
+           tf=TfSeen('map', 'optical', 1000.0, LINKS, '', '', FLOOR_FROM_CAMERA)), 'depth unit', 'multiplied by 0.25',
+     'depth_scale: 0.00025'),
+    (sound(edges_together='', edges_fault=None), 'pairs', 'arrive together', 'same clock'),
     (silent(BOXES2D), '2D boxes', 'no messages on /camera/boxes2d', 'wake it up'),
     (exact(with_stream(BOXES2D, stamps_ns=moved(STAMPS, 0.05))), 'boxes and depth', 'only 0 %', 'label'),
     (with_stream(BOXES2D, lag_s=1.6), 'boxes and depth', '1.6 s after their depth image', 'cache_length'),

@@ -14,10 +14,13 @@ from sensor_msgs.msg import CameraInfo, Image
 from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth
+from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.diagnosis.checks import ROLES
 from ros_3d_bb.diagnosis.message_observer import Observation
 from ros_3d_bb.diagnosis.observations import Observations, Stream
+from ros_3d_bb.diagnosis.roles import ROLES
+from ros_3d_bb.diagnosis.tf_arrivals import TfArrivals
+from ros_3d_bb.diagnosis.tf_tree import clock_fault_of_tf
 from ros_3d_bb.nodes.common.graph_observer import GraphObserver
 from ros_3d_bb.nodes.doctor import bag_findings, graph_findings, machine_findings
 from ros_3d_bb.pipeline.transform_buffer import TransformBuffer
@@ -189,7 +192,7 @@ def raw_only(topic, message):
 
 
 def raw_in_place(topic, message):
-    name, message = raw_only(topic, message)
+    name, message = raw_only(*beside(topic, message))
     return {RAW: DEPTH, RAW_INFO: DEPTH_INFO}.get(name, name), message
 
 
@@ -262,6 +265,23 @@ def test_the_pose_is_that_after_the_bag_has_looped(since_jump):
         link, = transform_messages(rospy.Time(second), [('map', 'camera', np.eye(4))])
         transforms.set_transform(link, '')
     assert seen.tf_seen(transforms, 'map').fault == ''
+
+
+@pytest.mark.parametrize('ahead_s, lag_s, in_time, is_fault', [
+    (0.0, 0.0, 1.0, False), (0.9, -0.9, 0.9, False), (3.0, -3.0, 0.4, True), (-0.1, 0.1, 1.0, False),
+    (-0.8, 0.8, 0.0, True)])
+def test_transforms_of_another_clock_are_a_fault(ahead_s, lag_s, in_time, is_fault):
+    """Within the transform_tolerance of a localisation, and the time that images wait for their transforms, is none."""
+    seen, transforms, arrivals = Observation(ROLES['depth'], DEPTH), TransformBuffer(), TfArrivals()
+    for number in range(50):
+        now_ns = 1000 * NS + number * NS // 10
+        link, = transform_messages(time_from(now_ns + int(ahead_s * NS)), [('map', 'camera', np.eye(4))])
+        transforms.set_transform(link, '')
+        arrivals.add(link, now_ns)
+        seen.take(Image(header=header_at(now_ns, 'camera')), now_ns)
+    tf = seen.tf_seen(transforms, 'map', '', arrivals, 0.2)
+    assert tf.lags_s['camera'] == pytest.approx(lag_s, abs=1e-6) and tf.in_time == pytest.approx(in_time, abs=0.1)
+    assert bool(clock_fault_of_tf(tf, 0.0, 0.2)[0]) == is_fault
 
 
 def test_robot10_is_not_robot1():

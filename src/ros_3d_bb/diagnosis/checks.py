@@ -3,49 +3,25 @@
 A check yields its findings, both faults and facts, and none if its input is missing: without depth images, for example,
 their unit is not checked.
 """
-from ros_3d_bb.camera.alignment import ALIGN, frames_fault, intrinsics_fault, size_fault, target_frame_fault
-from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, DEPTH_TOPICS, INFO_TOPICS
-from ros_3d_bb.conversions.image_msgs import DEPTH_SCALES
-from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, LATEST_NS, TRACKS_TOPIC
-from ros_3d_bb.diagnosis.observations import IMAGE, KEPT, Finding, Role
-from ros_3d_bb.diagnosis.tf_tree import optical_frame_fix, pose_fix, root_of, why_missing
+from ros_3d_bb.camera.alignment import target_frame_fault
+from ros_3d_bb.conversions.perception_msgs import LATEST_NS
+from ros_3d_bb.diagnosis.camera_checks import check_alignment, check_camera, check_encodings
+from ros_3d_bb.diagnosis.observations import KEPT, Finding
+from ros_3d_bb.diagnosis.roles import BOXES2D, BOXES3D, COLOR, DEPTH, IMAGES, INFO, TRACKS, needed_images
+from ros_3d_bb.diagnosis.tf_tree import (clock_fault_of_tf, frames_in, is_fixed_root, optical_frame_fix, pose_fix,
+                                         root_of, why_missing)
 from ros_3d_bb.diagnosis.topic_faults import (LATE_S, MIN_PAIRED, MIN_RATE_HZ, NO_CLOCK, clock_fault, paired_share,
                                               publishers_fault, silence_fault, span)
 
-COLOR, DEPTH, INFO, BOXES2D, BOXES3D, TRACKS = 'color', 'depth', 'info', 'boxes2d', 'boxes3d', 'tracks'
-IMAGES = COLOR, DEPTH, INFO
+APART_S = 0.1  # between the stamps of images that arrive together: of different clocks, if one is in the future; chosen
 MAX_REPEATED = 0.2  # share of the messages on a topic with the stamp of the one before; chosen
 UNSTAMPED_FIX = 'their publisher must set it to the time at which the image was taken'
-UNIT_FIX = ('correct the driver, or set depth_scale to metres per unit in config/bbox3d.yaml, config/tracker.yaml and, '
-            'for detector:=depth, config/depth_detector.yaml: 1.0 for metres, 0.001 for millimetres')
-NO_DEPTH_FIX = ('pass the topic of depth images in 16UC1 or 32FC1 (camera_depth:=TOPIC); compressed ones end in '
-                '/compressedDepth: JPEG changes depth')
-CAMERA = 'the camera (roslaunch ros_3d_bb realsense.launch)'
-CAMERA_SILENT = 'is the camera plugged in, the bag still playing (not paused), the network fast enough for images?'
-DETECTOR_SILENT = ('is the detector paused (call its service ~enable with true), still loading its weights, or '
-                   'configured to publish no empty arrays (publish_empty: false)?')
-ROLES = {
-    COLOR: Role('colour images', COLOR_TOPIC, IMAGE, 'camera_image', CAMERA, CAMERA_SILENT),
-    DEPTH: Role('depth images', DEPTH_TOPIC, IMAGE, 'camera_depth', CAMERA, CAMERA_SILENT),
-    INFO: Role('camera_info', INFO_TOPICS[0], 'sensor_msgs/CameraInfo', 'camera_info', CAMERA, CAMERA_SILENT),
-    BOXES2D: Role('2D boxes', BOXES_TOPIC, 'std_msgs/Int32MultiArray', 'bb_topic',
-                  'a detector (pipeline.launch detector:=yolov5 or depth)', DETECTOR_SILENT),
-    BOXES3D: Role('3D boxes', BOXES3D_TOPIC, 'ros_3d_bb/BoundingBox3DArray', '', 'bbox3d_node (pipeline.launch)',
-                  'see its log'),
-    TRACKS: Role('tracks', TRACKS_TOPIC, 'ros_3d_bb/TrackedObjectArray', '', 'tracker_node (pipeline.launch)',
-                 'see its log')}
-
-
-def role_named(name, kind):
-    """Return the Role of a topic by its name in the nodes; a generic Role for topics outside the pipeline."""
-    other = Role(kind, name, kind, '', 'its publisher', 'check its publisher')
-    return next((role for role in ROLES.values() if role.name == name), other)
 
 
 def findings(seen):
     """Run all checks of an `Observations`. Returns a list of Finding."""
-    checks = (_clock, _publishers, _images, _camera, _alignment, _encodings, _stamps, _pairs_of_images, _transforms,
-              _mount, _pairs_of_boxes, _results)
+    checks = (_clock, _publishers, _images, check_camera, check_alignment, check_encodings, _stamps, _pairs_of_images,
+              _transforms, _tilt, _mount, _pairs_of_boxes, _results)
     found = [finding for check in checks for finding in check(seen)]
     return found + list(_nodes(seen, any(finding.fault for finding in found)))
 
@@ -75,8 +51,7 @@ def _publishers(seen):
 
 
 def _images(seen):
-    needs_no_color = seen.is_bag and seen.streams[BOXES2D].count and not seen.streams[COLOR].count
-    for key in (DEPTH, INFO) if needs_no_color else IMAGES:
+    for key in needed_images(seen):
         stream = seen.streams[key]
         title, fact = stream.role.title, '%s, %.1f Hz' % (stream.topic, stream.rate_hz)
         if not stream.count:
@@ -89,61 +64,9 @@ def _images(seen):
             yield Finding(title, '', fault, fix)
         elif key != INFO and 0 < stream.rate_hz < MIN_RATE_HZ:
             yield Finding(title, fact, 'only %.1f Hz on %s' % (stream.rate_hz, stream.topic),
-                          'use USB 3, a wired network, or a lower resolution or rate (realsense.launch fps:=15)')
+                          'use USB 3, a wired network, or a lower resolution or rate (realsense.launch fps:=15)', False)
         else:
             yield Finding(title, fact)
-
-
-def _camera(seen):
-    if seen.color_info is None:
-        return
-    info, camera, fault = seen.color_info
-    if fault:
-        yield Finding('camera', '', '%s: %s' % (seen.streams[INFO].topic, fault),
-                      'calibrate the camera (camera_calibration), and pass the file to the driver; a RealSense has its '
-                      'own calibration')
-    else:
-        yield Finding('camera', '%d x %d pixels, focal length %.0f, frame %s' % (camera[:3] + (info.header.frame_id,)))
-
-
-def _alignment(seen):
-    """Check that depth has the image size, intrinsics and frame of colour."""
-    if seen.depth is None or seen.color_info is None or seen.color_info.fault:
-        return
-    if seen.depth_is_raw:
-        yield Finding('alignment', 'raw depth, which the nodes register to colour', *_registration_fault(seen))
-        return
-    depth, camera = seen.depth.message, seen.color_info.converted
-    fault = size_fault(camera, depth.width, depth.height) if depth.width else ''  # _encodings reports an empty image
-    if not fault and seen.depth_info is not None and not seen.depth_info.fault:
-        fault = intrinsics_fault(camera, seen.depth_info.converted)
-    of_frames = '' if seen.frame_id else frames_fault(seen.color_info.message.header.frame_id, depth.header.frame_id)
-    yield Finding('alignment', 'depth has the pixels and the frame of colour', fault or of_frames or seen.edges_fault,
-                  ALIGN)
-
-
-def _registration_fault(seen):
-    """Return why raw depth in a bag cannot be registered, and the fix; empty if it can."""
-    if not seen.is_bag:
-        return ()
-    if seen.depth_info is None:
-        return ('there is no camera_info of the depth camera', 'record it, or remap %s to it' % DEPTH_TOPICS['raw'][1])
-    color, depth = (one.message.header.frame_id.lstrip('/') for one in (seen.color_info, seen.depth))
-    links = seen.tf.links if seen.tf is not None else {}
-    if root_of(links, color) != root_of(links, depth):
-        return ('tf has no transform from %s to %s, with which raw depth is registered' % (depth, color),
-                'record /tf_static of the camera driver (publish_tf:=true)')
-    return ()
-
-
-def _encodings(seen):
-    is_depth = seen.depth is not None and seen.depth.message.encoding in DEPTH_SCALES
-    for subject, image, fix in (
-            ('colour', seen.color, 'set the camera to rgb8 or bgr8'),
-            ('depth', seen.depth, UNIT_FIX if is_depth else NO_DEPTH_FIX)):
-        if image is not None:
-            fact = '%s, %d x %d pixels' % (image.message.encoding, image.message.width, image.message.height)
-            yield Finding(subject + ' encoding', fact, image.fault, fix)
 
 
 def _stamps(seen):
@@ -154,7 +77,9 @@ def _stamps(seen):
             yield Finding('stamps', '', fault, fix)
             return
     if seen.streams[DEPTH].count and seen.streams[DEPTH].lag_s is not None:
-        yield Finding('stamps', 'depth images arrive %s after their stamp' % span(max(0.0, seen.streams[DEPTH].lag_s)))
+        lag_s = seen.streams[DEPTH].lag_s
+        yield Finding('stamps', 'depth images arrive %s %s their stamp' % (span(abs(lag_s)),
+                                                                           'before' if lag_s < 0 else 'after'))
 
 
 def _stamp_fault(seen, key):
@@ -188,9 +113,15 @@ def _stamp_fault(seen, key):
 
 
 def _clocks_differ(seen):
-    """Whether colour and depth images that arrive together have stamps that are too far apart to be paired."""
+    """Whether colour and depth images that arrive together have stamps of different clocks: too far apart to be paired,
+    later than their arrival, or apart although the images show the same time.
+    """
     lags_s = [seen.streams[key].lag_s for key in (COLOR, DEPTH)]
-    return None not in lags_s and abs(lags_s[0] - lags_s[1]) > seen.cache_length_s
+    if None in lags_s:
+        return False
+    apart_s = abs(lags_s[0] - lags_s[1])
+    return (apart_s > seen.cache_length_s or apart_s > APART_S and min(lags_s) < -APART_S
+            or seen.edges_together == '' and seen.edges_fault != '')
 
 
 def _pairs_of_images(seen):
@@ -212,17 +143,20 @@ def _pairs_of_images(seen):
 def _transforms(seen):
     if seen.tf is None:
         return
-    target, source, stamp_s, links, fault, of_viewing = seen.tf
+    target, source, stamp_s, links, fault, of_viewing = seen.tf[:6]
     if not source:
         yield Finding('transforms', '', 'the images have no frame_id',
                       'set it in their publisher, or pass frame_id:=FRAME (process_bag: frame_id in the file of '
                       '--bbox3d-params)')
         return
     optical_fault = target_frame_fault(target, source)
+    clock_fault, clock_fix = clock_fault_of_tf(seen.tf, seen.streams[DEPTH].lag_s, seen.tf_timeout_s)
     if optical_fault:
-        yield Finding('transforms', '', optical_fault, 'frame_world:=map, and %s' % pose_fix(source))
+        yield Finding('transforms', '', optical_fault, 'frame_world:=map, and %s' % pose_fix(source, seen.mount))
+    elif clock_fault:
+        yield Finding('transforms', '', clock_fault, clock_fix)
     elif fault:
-        cause, fix = why_missing(links, target, source, stamp_s)
+        cause, fix = why_missing(links, target, source, stamp_s, seen.mount, is_fixed_root(seen.tf, seen.mount))
         fault = 'no transform from %s to %s at the stamp of the image: %s' % (source, target, cause or fault)
         yield Finding('transforms', '', fault, fix or 'inspect the tree with rosrun tf view_frames')
     elif of_viewing:
@@ -231,10 +165,29 @@ def _transforms(seen):
         yield Finding('transforms', '%s to %s is available at the stamp of the image' % (source, target))
 
 
+def _tilt(seen):
+    """Report from which frame the tilt of the camera is, if tf does not contain ~floor_frame."""
+    tf = seen.tf
+    if tf is None or tf.root_from_camera is None or not seen.floor_frame or tf.fault or tf.viewing_fault:
+        return
+    if seen.floor_frame not in frames_in(tf.links):
+        yield Finding('tilt', 'that of the camera in %s, as tf has no frame %s (floor_frame)'
+                      % (root_of(tf.links, tf.source), seen.floor_frame))
+
+
 def _mount(seen):
-    """Report how a camera without the pose in tf is mounted, and whether its images must be rotated."""
-    mount = seen.mount
+    """Report the unit of depth and, of a camera without the pose in tf, how it is mounted and if its images must be
+    rotated."""
+    mount, tf = seen.mount, seen.tf
     if mount is None:
+        return
+    if mount.factors:
+        factor = _factor(mount, tf)
+        yield Finding('depth unit', '', '%d people are found in %d images, and %d if depth is multiplied by %g'
+                      % (mount.people[0], mount.images, mount.factors[factor], factor),
+                      'set depth_scale: %g in config/bbox3d.yaml, config/tracker.yaml and, for detector:=depth, '
+                      'config/depth_detector.yaml' % (factor * seen.depth.converted.scale_m))
+    if tf is None or not tf.fault:
         return
     if mount.turns:
         yield Finding('image rotation', '', '%d people are found in %d images, and %d if they are turned clockwise by '
@@ -243,6 +196,15 @@ def _mount(seen):
     if mount.pose is not None:
         yield Finding('floor', 'the camera is %.2f m above it, tilted by %.2f rad and rolled by %.2f rad; fitted to '
                       'the depth images' % mount.pose)
+
+
+def _factor(mount, tf):
+    """Return the factor of depth with which the floor is as far below the camera as by tf; without tf, that with which
+    most people are found."""
+    if mount.pose is None or tf is None or tf.root_from_camera is None:
+        return max(mount.factors, key=mount.factors.get)
+    wanted = tf.root_from_camera[2, 3] / mount.pose.height_m
+    return min(mount.factors, key=lambda factor: max(factor / wanted, wanted / factor))
 
 
 def _pairs_of_boxes(seen):

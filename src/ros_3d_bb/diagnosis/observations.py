@@ -62,6 +62,10 @@ class TfSeen(NamedTuple):
     links: dict  # of all frames, {frame: tf_tree.Link}
     fault: str  # why there is no transform; empty if there is one
     viewing_fault: str = ''  # why the frame cannot be that of the images
+    root_from_camera: Any = None  # pose (4, 4) of the camera in the root of its tree; None if it is unknown
+    moves: bool = False  # whether this pose changes
+    lags_s: Dict[str, float] = {}  # arrival minus stamp of the transforms of frames that tf repeats, median
+    in_time: Optional[float] = None  # share of the images at whose stamp tf has the pose, after waiting for it
 
 
 class Observations(NamedTuple):
@@ -75,18 +79,21 @@ class Observations(NamedTuple):
     depth_info: Optional[Newest] = None
     color: Optional[Newest] = None
     depth: Optional[Newest] = None
-    edges_fault: str = ''  # of `alignment.EdgeComparison`
+    edges_fault: Optional[str] = None  # of `alignment.EdgeComparison`, for images of the same stamp
+    edges_together: Optional[str] = None  # the same for images that arrive together with other stamps
     tf: Optional[TfSeen] = None
     use_sim_time: bool = False
     clock_count: int = 0  # number of /clock messages
     tf_senders: Dict[str, Tuple[str, ...]] = {}  # nodes that publish the same frame of tf at once, by frame
     nodes: dict = {}  # {name: (level, sentence)} from the diagnostics of nodes
-    mount: Any = None  # camera_mount.CameraMount of a camera without the pose in tf
+    mount: Any = None  # camera_mount.CameraMount of a bag with aligned depth
+    floor_frame: str = 'base_link'  # of bbox3d_node
     frame_id: str = ''  # of bbox3d_node, which replaces that of the images; empty: none
     depth_is_raw: bool = False  # not aligned to colour; the nodes register it
     raw_topics: Tuple[str, ...] = ()  # topics of a bag with depth images that are not aligned to colour
     depth_info_topic: str = ''  # of the camera_info of depth
     stamp_tolerance_s: float = 0.0
+    tf_timeout_s: float = 0.2  # of tracker_node
     cache_length_s: float = 1.0
 
 
@@ -97,6 +104,7 @@ class Finding(NamedTuple):
     fact: str = ''
     fault: str = ''
     fix: str = ''
+    is_fatal: bool = True  # of a fault: whether results are wrong or missing because of it
 
     @property
     def lines(self):

@@ -103,7 +103,9 @@ class DepthCameraCheck(object):
             except ValueError:  # the node reports colour; many drivers leave depth's K empty
                 pass
         if fault:
-            yield 'alignment', 'depth is not aligned to colour: %s; positions are wrong; %s' % (fault, ALIGN)
+            yield 'alignment', ('depth is not aligned to colour, or has a wrong header or camera_info: %s; positions '
+                                'may be wrong; rosrun ros_3d_bb doctor compares the images; if they disagree: %s'
+                                % (fault, ALIGN))
 
 
 class SampleImages(object):

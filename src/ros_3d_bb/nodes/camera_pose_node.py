@@ -73,8 +73,8 @@ class CameraPoseNode(object):
                 self._diagnostics.count('images processed')
             if is_visible is False:
                 self._diagnostics.warn('images without floor', 'no floor is visible in the depth image, so that the '
-                                       'pose of the camera remains unknown; waiting for the next, or give the pose: '
-                                       'camera_height:=1.2 camera_tilt:=0.1')
+                                       'pose of the camera remains unknown; waiting for the next, or measure the pose, '
+                                       'and pass camera_height:= and camera_tilt:=')
             if self._stage.is_complete:
                 self._publish(message.header.stamp)
 

@@ -11,8 +11,9 @@ from sensor_msgs.msg import CameraInfo
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, RAW, info_topic_beside, topic_of
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC
 from ros_3d_bb.core.params import params_from
-from ros_3d_bb.diagnosis.checks import BOXES3D, COLOR, DEPTH, ROLES
 from ros_3d_bb.diagnosis.message_observer import EdgeObserver, Observation, observations_of
+from ros_3d_bb.diagnosis.roles import BOXES3D, COLOR, DEPTH, ROLES
+from ros_3d_bb.diagnosis.tf_arrivals import TfArrivals
 from ros_3d_bb.nodes.common.master import published_topics, publishers_of
 from ros_3d_bb.nodes.common.subscribers import IMAGE_BUFFER
 from ros_3d_bb.nodes.common.tf_lookup import TransformListener
@@ -22,6 +23,18 @@ from ros_3d_bb.pipeline.transform_buffer import TransformBuffer
 
 NAMES_S = 1.5  # nodes publish the names of their topics once per second
 OURS = ': pipeline'  # suffix of the diagnostics of the nodes of this package
+
+
+class ObservedTransforms(TransformBuffer):
+    """tf2 buffer that also records when the transforms of /tf arrive: `arrivals`."""
+
+    def __init__(self):
+        TransformBuffer.__init__(self)
+        self.arrivals = TfArrivals()
+
+    def set_transform(self, transform, authority):
+        self.arrivals.add(transform, rospy.get_rostime().to_nsec())
+        TransformBuffer.set_transform(self, transform, authority)
 
 
 class GraphObserver(object):
@@ -34,7 +47,7 @@ class GraphObserver(object):
     def __init__(self, target_frame='', camera=''):
         self._target_frame, self._camera = target_frame, camera
         self._statuses, self._clocks = {}, []
-        self._transforms = TransformBuffer()
+        self._transforms = ObservedTransforms()
         self._listener = TransformListener(self._transforms)
         self._subscribers = [rospy.Subscriber('/diagnostics', DiagnosticArray, self._on_diagnostics),
                              rospy.Subscriber('/clock', Clock, self._clocks.append, queue_size=10)]
@@ -64,16 +77,19 @@ class GraphObserver(object):
         target_frame = self._target_frame or tracker_param('target_frame')
         camera_frame = tracker_param('camera_frame') or (
             boxes3d.header.frame_id if boxes3d is not None else frame_id)
+        timeout_s = tracker_param('tf_timeout')
         return observations_of(
             self._observed, self._depth_info, self._topics, time.monotonic() - self._began_s, publishers_of,
             self._bbox3d_param('depth_scale'), frame_id=frame_id,
-            tf=self._observed[DEPTH].tf_seen(self._transforms, target_frame, camera_frame),
-            use_sim_time=bool(rospy.get_param('/use_sim_time', False)), clock_count=len(self._clocks),
+            tf=self._observed[DEPTH].tf_seen(self._transforms, target_frame, camera_frame, self._transforms.arrivals,
+                                             timeout_s),
+            tf_timeout_s=timeout_s, use_sim_time=bool(rospy.get_param('/use_sim_time', False)),
+            clock_count=len(self._clocks),
             tf_senders=self._transforms.senders(),
             nodes={name: status[:2] for name, status in list(self._statuses.items())},
-            edges_fault=self._edges.fault(), depth_is_raw=self._bbox3d_param('depth') == RAW,
+            depth_is_raw=self._bbox3d_param('depth') == RAW, floor_frame=self._bbox3d_param('floor_frame'),
             stamp_tolerance_s=self._bbox3d_param('stamp_tolerance'),
-            cache_length_s=self._bbox3d_param('cache_length'))
+            cache_length_s=self._bbox3d_param('cache_length'), **self._edges.faults())
 
     def _bbox3d_param(self, name):
         return _param(topic_of(self._camera, 'bbox3d_node'), name, Bbox3dParams)
