@@ -139,7 +139,8 @@ def test_a_person_of_whom_only_head_and_feet_have_depth_is_there():
     assert foreground(depth, (14, 4, 46, 44)).center_m[2] == pytest.approx(2.5 + PERSON_CLASS.axis, abs=0.02)
 
 
-@pytest.mark.parametrize('width_px,height_px,expected', [(24, 34, True), (40, 34, True), (46, 34, False), (20, 46, True)])
+@pytest.mark.parametrize('width_px,height_px,expected', [(24, 34, True), (40, 34, True), (46, 34, False),
+                                                         (20, 46, True)])
 def test_people_are_not_wider_than_their_arms_nor_higher_than_raised_arms(width_px, height_px, expected):
     """Of people at 3 m, a pixel is 0.05 m."""
     x, y = 32 - width_px // 2, 24 - height_px // 2

@@ -212,6 +212,17 @@ def test_moving_has_hysteresis():
     assert slowing[-1][0].moving
 
 
+def test_the_error_of_the_pose_of_the_robot_is_in_the_covariance():
+    """A turn of the robot moves people at right angles to their direction from the camera, which is at the origin."""
+    plain, uncertain = (play(Tracker(prediction=params), 1, standing((4, 3)))[-1][0] for params in (
+        PredictionParams(), PredictionParams(pose_sigma=0.05, pose_yaw_sigma=0.02)))
+    x, y = plain.position_m[:2] - VIEW.fixed_from_camera[:2, 3]
+    turned = 0.02 ** 2 * np.array([[y * y, -x * y], [-x * y, x * x]])
+    for before, after in ((plain.covariance, uncertain.covariance),
+                          (plain.prediction_covariance_m2[-1], uncertain.prediction_covariance_m2[-1])):
+        np.testing.assert_allclose((after - before)[:2, :2], 0.05 ** 2 * np.eye(2) + turned, atol=1e-9)
+
+
 @pytest.mark.parametrize('late_s', [0.0, 0.6, 5.0])
 def test_a_duplicate_or_too_late_image_is_rejected_without_any_change(late_s):
     tracker = Tracker()

@@ -65,7 +65,7 @@ class Box3D(NamedTuple):
     def is_plausible(self):
         """Whether the centre is nearer than `MAX_COORDINATE_M`, and width and height are between 0 and `largest_m`."""
         x_m, y_m, z_m = self.center_m.tolist()
-        (width_m, height_m, _width_m), (widest_m, tallest_m) = self.size_m.tolist(), self.largest_m
+        (width_m, height_m), (widest_m, tallest_m) = self.size_m[:2].tolist(), self.largest_m
         return (0 < width_m < widest_m and 0 < height_m < tallest_m
                 and abs(x_m) < MAX_COORDINATE_M and abs(y_m) < MAX_COORDINATE_M and abs(z_m) < MAX_COORDINATE_M)
 

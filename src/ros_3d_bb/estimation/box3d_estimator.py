@@ -10,8 +10,8 @@ import numpy as np
 
 from ros_3d_bb.camera.images import FARTHEST_M
 from ros_3d_bb.core.object_classes import PERSON, ObjectClasses
-from ros_3d_bb.estimation.box3d import (HIDDEN, LEVEL, NO_DEPTH, NO_LAYER, NO_RAY, REPEATED, UNKNOWN, Box3D, ImageGeometry,
-                                        Rejected, truncated_edges, without_distortion)
+from ros_3d_bb.estimation.box3d import (HIDDEN, LEVEL, NO_DEPTH, NO_LAYER, NO_RAY, REPEATED, UNKNOWN, Box3D,
+                                        ImageGeometry, Rejected, truncated_edges, without_distortion)
 from ros_3d_bb.estimation.depth_samples import (BESIDE_TRUNK_M, BODY_HALF_DEPTH_MM, FEET_M, LEAST_SIZE, LOOKS_DOWN,
                                                 RectSamples, grid_in, level_rays)
 from ros_3d_bb.estimation.median import centred_grid, estimate_median

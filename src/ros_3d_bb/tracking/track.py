@@ -85,6 +85,11 @@ class PredictionParams(NamedTuple):
         0.15, 'A velocity much lower than this is not extrapolated: it is mostly noise.', 'm/s', live=(0, 1))
     position_bias: float = Param(
         0.05, 'Standard deviation added for errors that stay the same for seconds.', 'm', live=(0, 0.5))
+    pose_sigma: float = Param(
+        0.0, 'Standard deviation of the position of the robot in the frame of the tracks, along each axis, as of its '
+        'localisation.', 'm', live=(0, 1))
+    pose_yaw_sigma: float = Param(
+        0.0, 'Standard deviation of the heading of the robot in the frame of the tracks.', 'rad', live=(0, 0.5))
 
 
 class Rules(NamedTuple):
@@ -331,7 +336,7 @@ def learned_prediction(log_scale, assumed_m, params):
     return params._replace(position_bias=lasting_m, standing_speed=params.standing_speed * math.sqrt(scale))
 
 
-def published(tracks, params, moving_speed):
+def published(tracks, params, moving_speed, camera_m):
     """Convert tracks to a list of TrackedObject with predictions at constant velocity; `params` are PredictionParams.
 
     A track that was moving when it was last detected may have been stopped since, see `occlusion.mark_missed`.
@@ -339,14 +344,17 @@ def published(tracks, params, moving_speed):
     People sway as they walk. The predicted velocity v is therefore between that of the filter and the slow one. A low
     velocity is mostly noise of a standing person, so v is scaled by v² / (v² + standing_speed²). The covariance of the
     filter does not include errors that stay constant for seconds, such as those of a wrong calibration; `position_bias`
-    is added for them. A prediction is a mixture of two Gaussians with the same mean: the person goes on, with
+    is added for them, and the error of the robot's pose: `pose_sigma`, and `pose_yaw_sigma` about the position (2,) of
+    the camera, `camera_m`. A prediction is a mixture of two Gaussians with the same mean: the person goes on, with
     `prediction_acceleration`, or is in a manoeuvre, with `manoeuvre_acceleration` in addition. The covariance is that
     of the mixture.
     """
     if not tracks:
         return []
     numbers = np.array([_numbers_of(track, params.standing_speed ** 2 + LEAST_SPEED2) for track in tracks])
-    numbers[:, XX:YY + 1:YY - XX] += params.position_bias ** 2
+    numbers[:, [XX, YY]] += params.position_bias ** 2 + params.pose_sigma ** 2
+    across = (numbers[:, :2] - camera_m)[:, ::-1] * (-params.pose_yaw_sigma, params.pose_yaw_sigma)
+    numbers[:, [XX, XY, YY]] += across[:, (0, 0, 1)] * across[:, (0, 1, 1)]
     times_s, powers, spread = _times(params.prediction_time, params.prediction_step)
     densities = params.prediction_acceleration + params.manoeuvre_acceleration * numbers[:, MANOEUVRING]
     positions_m, velocities_mps, sizes_m = numbers[:, POSITION], numbers[:, VELOCITY], numbers[:, SIZE]

@@ -29,7 +29,7 @@ from ros_3d_bb.tracking.types import VISIBLE, check_steps
 KNOWN_NS = 60 * NS  # a camera without images for longer than this, while others send images, counts as new; chosen
 MAX_POSITION_STD_M = 2.4  # tracks whose position is less certain are dropped; chosen
 TENTATIVE_TIMEOUT_S = 0.75  # how long a tentative track is kept without a detection; chosen
-BY_ID, FIRST_SEEN = operator.attrgetter('id'), operator.attrgetter('first_ns')
+BY_ID, FIRST_SEEN, BY_STAMP = (operator.attrgetter(name) for name in ('id', 'first_ns', 'stamp_ns'))
 # Sections of the parameters.
 MOTION, ASSOCIATION = 'how people move', 'association of boxes with tracks'
 
@@ -162,7 +162,9 @@ class Tracker(object):
         tracks = [track for track in sorted(state.tracks, key=BY_ID) if track.is_confirmed and (
             track.status == VISIBLE or track.log_odds >= MIN_TRACK_SCORE and track.state.position_m2 < largest_m2)]
         prediction = learned_prediction(state.log_noise_scale, noise.noise_unknown, prediction)
-        return published(tracks, prediction, params.moving_speed)
+        newest = max(state.cameras.values(), key=BY_STAMP, default=None)
+        camera_m = newest.view.fixed_from_camera[:2, 3] if newest else (0, 0)
+        return published(tracks, prediction, params.moving_speed, camera_m)
 
     def _step(self, before, image, observed_s, assign_id):
         """One cycle of the tracker: see `step` of OutOfSequenceBuffer."""
