@@ -68,6 +68,14 @@ def test_cameras_that_contradict_each_other_are_reported_once(apart_m, expected)
     assert not expected or 'front and left' in rig.events.sentences['cameras that contradict each other']
 
 
+@pytest.mark.parametrize('period_s, expected', [(0.5, None), (1.0, 1), (2.0, 1)])
+def test_images_too_far_apart_to_track_people_are_reported_once(rig, period_s, expected):
+    """One gap of 10 s is none of them."""
+    for number in range(10):
+        rig.send(START_NS + int(number * period_s * NS) + (number > 5) * 10 * NS)
+    assert rig.events.counts.get('rate of images too low') == expected
+
+
 def test_an_optical_target_frame_is_rejected():
     """By its name when the tracker starts, by that of the boxes when they arrive."""
     with pytest.raises(ValueError, match='camera_rgb_optical_frame is an optical frame.*camera_height'):

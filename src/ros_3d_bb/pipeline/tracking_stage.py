@@ -1,4 +1,5 @@
 """Tracking stage: tracks from 3D boxes and transforms, shared by tracker_node and process_bag."""
+import collections
 import functools
 import re
 import threading
@@ -18,11 +19,12 @@ from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.object_classes import read_object_classes
 from ros_3d_bb.core.params import (CLASSES_FILE, DEPTH, DEPTH_SCALE, SET_BY_LAUNCH, STAMP_TOLERANCE, NestedList, Param,
                                    parameters)
-from ros_3d_bb.core.time_sync import NS, CameraClocks, MessageCache
+from ros_3d_bb.core.time_sync import JITTER, NS, CameraClocks, MessageCache, median_period_ns
 from ros_3d_bb.estimation.error_model import error_model_of_param
 from ros_3d_bb.pipeline.depth_registration import DepthRegistration
 from ros_3d_bb.pipeline.tracking_frame import AUTO, TrackingFrame, transformed
 from ros_3d_bb.tracking.ignored_areas import IgnoredAreas, polygons_from
+from ros_3d_bb.tracking.manoeuvres import LONGEST_NS
 from ros_3d_bb.tracking.measurement_model import NoiseParams
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.track import PredictionParams
@@ -32,6 +34,8 @@ from ros_3d_bb.tracking.types import CameraView, detections_from_boxes
 TRACKING_PARAMS = TrackerParams, NoiseParams, PredictionParams
 AHEAD, BEHIND = 'images ahead of other cameras', 'images behind other cameras'  # counters
 CONTRADICTION = 'cameras that contradict each other'  # event, reported once
+TOO_SLOW = 'rate of images too low'  # event, reported once
+RECENT = 5  # images whose median period counts, so that a single gap does not; chosen
 NAMESPACE = re.compile(r'/?[A-Za-z]\w*(/\w+)*$')
 PLACES = 'where no track starts'  # section of the parameters
 SHOWN_RANGE_M = 6.0  # of the field of view, as shown; that of the depth detector
@@ -99,6 +103,7 @@ class TrackingStage(object):
         self._clocks = CameraClocks()
         self._jumps = 0  # number of backward jumps in time
         self._boxes_ns = {}  # newest stamp of tracked boxes, by camera
+        self._recent_ns = {camera: collections.deque(maxlen=RECENT) for camera in self.cameras}  # stamps of boxes
         self._frames, self._intrinsics = {}, {}  # by camera
         self._frame = TrackingFrame(transforms, params.tracking_frame, params.target_frame)
         self._areas = _areas_of(params)
@@ -231,6 +236,7 @@ class TrackingStage(object):
         self._boxes_ns[camera], self._poses[camera] = stamp_ns, pose
         if stamp_ns == newest_ns:
             self._newest_pose = pose
+        self._check_rate(stamp_ns, camera)
         silent = self._silent_cameras(newest_ns)
         if silent:
             self._events.warn('tracks withheld', 'no boxes of %s were tracked within the last %g s (~camera_timeout): '
@@ -251,6 +257,15 @@ class TrackingStage(object):
                       for detection, place_m in zip(detections, places_m)]
         self._events.count('boxes in ignored areas', sum(detection.is_ignored for detection in detections))
         return detections
+
+    def _check_rate(self, stamp_ns, camera):
+        """Report images so far apart that the tracker assigns no boxes of people who move."""
+        recent_ns = self._recent_ns[camera]
+        recent_ns.append(stamp_ns)
+        period_ns = median_period_ns(list(recent_ns))
+        if len(recent_ns) == RECENT and (1 + JITTER) * period_ns > LONGEST_NS and TOO_SLOW not in self._events.counts:
+            self._events.warn(TOO_SLOW, '3D boxes arrive every %.2f s; people are tracked if it is less than %g s: '
+                              'choose a faster detector' % (period_ns / NS, LONGEST_NS / NS))
 
     def _silent_cameras(self, newest_ns):
         """Names of the cameras whose newest boxes are older than ~camera_timeout."""
