@@ -27,6 +27,9 @@ def outputs_of(head, boxes, scores, input_hw, strides=(8, 16, 32), bins=8):
     if head == 'end-to-end':
         return [np.hstack((boxes, scores.max(axis=1)[:, None], scores.argmax(axis=1)[:, None]))[None]]
 
+    if head == 'rtdetr':
+        relative = np.hstack((center, size)) / np.array(input_hw[::-1] * 2, float)
+        return [np.hstack((relative, scores.max(axis=1)[:, None], scores.argmax(axis=1)[:, None]))[None]]
     cells = grid(input_hw, tuple(strides)).astype(float)
     columns, rows = (center // strides[0]).astype(int).T
     used = rows * -(-input_hw[1] // strides[0]) + columns

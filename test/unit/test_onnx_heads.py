@@ -24,7 +24,7 @@ def test_heads_are_recognised_and_decoded(head, names):
     outputs = outputs_of(head, BOXES, SCORES, HW, STRIDES.get(head, (8, 16, 32)))
     layout = layout_of(outputs, HW, {}, names=names)
     assert layout.head == head
-    assert layout.classes == (80 if head == 'end-to-end' and not names else 3)
+    assert layout.classes == (80 if HEADS[head].suppressed and not names else 3)
     found = detections_in(outputs, layout)
     np.testing.assert_allclose(found.boxes, BOXES, atol=1e-3)
     np.testing.assert_allclose(found.scores, SCORES.max(axis=1), atol=1e-6)
@@ -52,6 +52,15 @@ def test_networks_that_suppress_are_known_by_their_metadata():
     rows = np.zeros((1, 252, 38))  # as many rows as the grid has cells
     assert layout_of([rows], HW, {'end2end': 'True'}).head == 'end-to-end'
     assert layout_of([rows], HW, {'args': "{'nms': True}"}).head == 'end-to-end'
+
+
+def test_boxes_relative_to_the_input_are_those_of_rtdetr_or_rejected():
+    """With metadata, the widths and heights of RT-DETR need not show in the values."""
+    rows = np.array([[(0.2, 0.2, 0.6, 0.8, 0.9, 0)]])
+    assert layout_of([rows], HW, {'head': 'RTDETRDecoder', 'end2end': 'True'}).head == 'rtdetr'
+    for metadata in ({}, {'end2end': 'True'}):
+        with pytest.raises(ValueError, match='from 0 to 1'):
+            layout_of([rows], HW, metadata)
 
 
 def test_rows_without_objectness_are_those_of_yolov6():

@@ -46,6 +46,14 @@ def decode_final(outputs, _input_hw, _classes, confidence, _strides=()):
     return Detections(rows[:, :4], rows[:, 4], rows[:, 5].astype(int))
 
 
+def decode_relative(outputs, input_hw, _classes, confidence, _strides=()):
+    """RT-DETR of ultralytics: rows of x, y, width, height, relative to the input, score, class number; (1, n, 6)."""
+    rows = outputs[0][0]
+    rows = rows[rows[:, 4] > confidence]
+    height, width = input_hw
+    return Detections(_corners(rows[:, :4] * (width, height, width, height)), rows[:, 4], rows[:, 5].astype(int))
+
+
 def decode_distances(outputs, input_hw, classes, confidence, strides, offset=0.5):
     """NanoDet and PicoDet: class scores, and a distribution of the distance from the cell to each edge of the box.
 

@@ -3,13 +3,14 @@ import functools
 from typing import Callable, NamedTuple, Tuple
 
 from ros_3d_bb.core.object_classes import COCO
-from ros_3d_bb.detection.onnx.decoders import (cell_count, decode_columns, decode_distances, decode_final, decode_rows,
-                                               decode_yolox, is_probability)
+from ros_3d_bb.detection.onnx.decoders import (cell_count, decode_columns, decode_distances, decode_final,
+                                               decode_relative, decode_rows, decode_yolox, is_probability)
 from ros_3d_bb.detection.weights import MAX_CLASSES
 
 P3, P6 = (8, 16, 32), (8, 16, 32, 64)
 GRIDS = (P3, P6, (4, 8, 16, 32))
 TASKS = ('detect', 'segment', 'pose')  # of ultralytics, whose outputs contain boxes
+RTDETR = 'RTDETRDecoder'  # in the metadata of ultralytics
 YOLOV5_ANCHORS = 3  # predictions of each cell
 USUAL_CHANNELS = 32, 44, 68  # of four distributions of distances, of 8 bins as in most networks, 11 or 17
 IMAGENET_MEAN, IMAGENET_STD = (123.675, 116.28, 103.53), (58.395, 57.12, 57.375)  # red, green, blue
@@ -34,6 +35,7 @@ HEADS = {
     'yolov5': Head(decode_rows, '(1, n, 5 + classes)'),
     'yolov8': Head(decode_columns, '(1, 4 + classes, n)'),
     'end-to-end': Head(decode_final, '(1, n, 6)', suppressed=True),
+    'rtdetr': Head(decode_relative, '(1, n, 6), relative to the input', suppressed=True, resize='stretch'),
     'yolox': Head(decode_yolox, '(1, n, 5 + classes)', P3, color='bgr', std=(1.0, 1.0, 1.0), resize='corner'),
     'yolox-decoded': Head(decode_rows, '(1, n, 5 + classes)', color='bgr', std=(1.0, 1.0, 1.0), resize='corner'),
     'nanodet': Head(decode_distances, '(1, n, classes + 4 * bins), or (1, n, classes) and (1, n, 4 * bins) by stride',
@@ -137,7 +139,7 @@ def _head_of(output, input_hw, grid, metadata):
     """Name of the head with one output (1, n, m). Raises ValueError if it is unknown."""
     rows, columns = output.shape[1:]
     if columns >= 6 and (metadata.get('end2end') == 'True' or "'nms': True" in metadata.get('args', '')):
-        return 'end-to-end'
+        return _head_of_final(output[0], metadata)
     cells = cell_count(input_hw, grid)
     if grid and columns == cells:
         return 'yolov8'
@@ -150,8 +152,21 @@ def _head_of(output, input_hw, grid, metadata):
             return 'yolov5'
         return 'yolox-decoded' if output[0, :, 0].max() > input_hw[1] / 2 else 'yolox'
     if columns == 6 and not (output[0, :, 5] % 1).any():  # class numbers; else scores, as of RT-DETR with two classes
-        return 'end-to-end'
+        return _head_of_final(output[0], metadata)
     raise ValueError('its outputs are those of no known head')
+
+
+def _head_of_final(rows, metadata):
+    """Name of the head whose rows contain a box, its score and its class number. Raises ValueError if it is unknown."""
+    boxes = rows[:, :4]
+    if rows.shape[1] == 6 and metadata.get('head') == RTDETR:
+        return 'rtdetr'
+    if not boxes.any() or boxes.max() > 1:  # pixels
+        return 'end-to-end'
+    if (boxes[:, 2:] < boxes[:, :2]).any():  # width and height; corners are in order
+        return 'rtdetr'
+    raise ValueError('its boxes are from 0 to 1; corners in pixels of its input, or centres, widths and heights relative '
+                     'to it expected')
 
 
 def _class_count(head, shapes, metadata, names):
