@@ -227,7 +227,7 @@ class RectSamples(object):
         arms fill in part; 0 if it is not known that background fills the rest, or if a nearer object is in front."""
         ahead_m = self._along(AHEAD)
         is_in_front = (ahead_m > 0) & (ahead_m < layer_m - BODY_HALF_DEPTH_MM / 1000)
-        if is_in_front.mean() > MOST_IN_FRONT:
+        if np.count_nonzero(is_in_front) > MOST_IN_FRONT * is_in_front.size:
             return 0
         with np.errstate(divide='ignore', invalid='ignore'):  # without depth
             across_m = self._along(ACROSS) * (layer_m / ahead_m)
