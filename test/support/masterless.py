@@ -88,6 +88,8 @@ def masterless(params=(), names=()):
         'ros_3d_bb.nodes.common.subscribers._inputs': [],
         'ros_3d_bb.nodes.common.diagnostics.Diagnostics._run': mock.Mock(),
         'ros_3d_bb.nodes.common.detector_output.NewestWorker': immediate_worker,
+        # Detections take no time: on a slow machine, images would be left out.
+        'ros_3d_bb.nodes.common.detector_output.time': mock.Mock(monotonic=lambda: 0.0),
         'ros_3d_bb.nodes.people_node.NewestWorker': immediate_worker,
         'ros_3d_bb.nodes.tracker_node.NewestWorker': immediate_worker,
         'ros_3d_bb.nodes.bbox3d_node.NewestWorker': immediate_worker,

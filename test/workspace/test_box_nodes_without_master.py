@@ -203,11 +203,10 @@ def test_the_newest_image_is_processed_and_others_are_skipped(camera, image, mon
     assert camera.publishers[BOXES_TOPIC].count + node._diagnostics.counts['images skipped for a newer one'] == 60
 
 
-def test_a_slow_network_gets_smaller_images_as_the_range_permits_and_then_fewer_at_a_steady_rate(monkeypatch):
+def test_a_slow_network_gets_smaller_images_as_the_range_permits_and_then_fewer_at_a_steady_rate():
     """All detections take 50 ms, at 30 Hz."""
     clock = mock.Mock(monotonic=mock.Mock(side_effect=np.arange(0, 1000, 0.05)))
-    monkeypatch.setattr(detector_output, 'time', clock)
-    with masterless({'weights': 'blind.pt'}) as connections:
+    with masterless({'weights': 'blind.pt'}) as connections, mock.patch.object(detector_output, 'time', clock):
         node, sizes, stamps_ns = TARGETS['yolov5_node'].make(), [], []
         for number in range(4 * WINDOW):
             messages = good_messages(START_NS + number * NS // 30)
