@@ -13,7 +13,9 @@ WINDOW = 15  # images and detections of which the median is used
 # measured in people_node, a share of 0.75 loses one of 500 images, 0.9 one of 40 (simulated, see its tests).
 BUSY_SHARE = 0.75
 FREE_SHARE = 0.6  # share of the period that a larger size may take, as estimated from its number of pixels; chosen
+FASTER_SHARE = 0.9  # share of fewer periods that a detection may take before it is done in more images; chosen
 PATIENCE, MAX_PATIENCE = 4, 512  # windows of images in a row with enough time before work is increased; chosen
+SOON = 30  # windows of images; an increase that is undone within them was none; chosen
 PERSON_M = 1.7  # height of a person
 # Height of a person in the input from which on YOLOv5n finds 9 of 10 people of the thesis; it finds no more of them at
 # 8 m in larger inputs. At 65 to 70 pixels 8, at 53 pixels 4. Measured:
@@ -39,8 +41,8 @@ class DetectionPace(object):
     periods its age is d + n / 2 instead of d + 1 / 2 + d / 2, and n < d + 1.
 
     Work is reduced after one window of detections that are too slow, and increased after several in which there was
-    enough time. Each time that an increase is undone, the next one has to wait for twice as many windows, so that size
-    and rate do not oscillate, whatever the durations depend on.
+    enough time. Each time that an increase is soon undone, the next one has to wait for twice as many windows, so that
+    size and rate do not oscillate, whatever the durations depend on.
 
     Attributes
     ----------
@@ -54,7 +56,7 @@ class DetectionPace(object):
         self._lock = threading.Lock()
         self._stamps_ns, self._durations_s = collections.deque(maxlen=WINDOW), []
         self._sizes, self.size, self.interval = tuple(sizes), max(sizes), 1
-        self._windows_with_time, self._patience, self._has_increased = 0, PATIENCE, False
+        self._windows_with_time, self._windows_since_increase, self._patience = 0, None, PATIENCE
         self._detected_ns = None  # stamp of the newest image for detection
 
     def use_sizes(self, sizes):
@@ -83,10 +85,11 @@ class DetectionPace(object):
                 return False
             duration_s, self._durations_s = statistics.median(self._durations_s), []
             period_s = max(median_period_ns(list(self._stamps_ns)) / NS, 1e-3)
+            if self._windows_since_increase is not None:
+                self._windows_since_increase += self.interval
             reduced = self._reduced(duration_s, period_s)
             if reduced is not None:
-                if self._has_increased:
-                    self._patience = min(2 * self._patience, MAX_PATIENCE)
+                self._adapt_patience()
                 self._set(*reduced)
                 return True
             increased = self._increased(duration_s, period_s)
@@ -94,12 +97,18 @@ class DetectionPace(object):
             if self._windows_with_time < self._patience:
                 return False
             self._set(*increased)
-            self._has_increased = True
+            self._windows_since_increase = 0
             return True
+
+    def _adapt_patience(self):
+        """Wait longer for the next increase if the last one is undone soon, or no longer than at first."""
+        if self._windows_since_increase is not None:
+            was_soon = self._windows_since_increase <= SOON
+            self._patience = min(2 * self._patience, MAX_PATIENCE) if was_soon else PATIENCE
 
     def _set(self, size, interval):
         self.size, self.interval = size, interval
-        self._durations_s, self._windows_with_time, self._has_increased = [], 0, False
+        self._durations_s, self._windows_with_time, self._windows_since_increase = [], 0, None
 
     def _reduced(self, duration_s, period_s):
         """Size and interval with less work, if detections take too long; else None."""
@@ -113,7 +122,7 @@ class DetectionPace(object):
 
     def _increased(self, duration_s, period_s):
         """Size and interval with more work, if there is time for it; else None."""
-        interval = math.ceil(duration_s / (BUSY_SHARE * period_s))
+        interval = math.ceil(duration_s / (FASTER_SHARE * period_s))
         if interval < self.interval:
             return self.size, interval
         larger = [size for size in self._sizes if size > self.size][:1]
