@@ -39,4 +39,4 @@ def test_playback_tracks_the_person_in_the_map(single_process, session_folder, w
     assert len(errors_m) > len(tracks.messages) * 0.25 and np.percentile(errors_m, 95) < 0.3
     assert all(message.objects[0].id >= 1 for message in tracks.messages if message.objects)
     drawn = set(marker.ns for message in markers.messages for marker in message.markers if marker.action == Marker.ADD)
-    assert drawn == {'cylinder', 'id', 'velocity', 'prediction', 'history', 'ellipse'}
+    assert drawn == {'cylinder', 'id', 'velocity', 'prediction', 'history', 'ellipse', 'field_of_view'}
