@@ -22,7 +22,7 @@ class CameraMount(NamedTuple):
     people: dict
     turns: int
     pose: Optional[CameraPose] = None
-    factors: dict = {}  # {factor: people}, if there are more than in the images as received
+    factors: dict = {}  # {factor: (people, pose)}, if there are more than in the images as received
 
 
 def camera_mount(pairs, camera):
@@ -41,11 +41,17 @@ def camera_mount(pairs, camera):
     best = max(people, key=lambda turns: (people[turns], -turns))
     turns = best if people[best] >= enough else 0
     if len(people) > 1 and not turns:
-        found = {factor: _people_in(_scaled(chosen, factor), camera, 0) for factor in UNITS}
-        factors = {factor: count for factor, count in found.items() if count >= enough}
-    floors = [fit_floor(turned_depth(depth, turns), turned_camera(camera, turns)) for _color, depth in chosen]
+        scaled = {factor: _scaled(chosen, factor) for factor in UNITS}
+        found = {factor: (_people_in(pairs, camera, 0), _pose_in(pairs, camera, 0)) for factor, pairs in scaled.items()}
+        factors = {factor: (count, pose) for factor, (count, pose) in found.items() if count >= enough}
+    return CameraMount(len(chosen), people, turns, _pose_in(chosen, camera, turns), factors)
+
+
+def _pose_in(pairs, camera, turns):
+    """CameraPose above the floor in images that are turned clockwise by quarter turns; None if none shows it."""
+    floors = [fit_floor(turned_depth(depth, turns), turned_camera(camera, turns)) for _color, depth in pairs]
     floors = [floor for floor in floors if floor is not None]
-    return CameraMount(len(chosen), people, turns, camera_pose_above(floors) if floors else None, factors)
+    return camera_pose_above(floors) if floors else None
 
 
 def _scaled(pairs, factor):

@@ -8,8 +8,8 @@ from ros_3d_bb.conversions.perception_msgs import LATEST_NS
 from ros_3d_bb.diagnosis.camera_checks import check_alignment, check_camera, check_encodings
 from ros_3d_bb.diagnosis.observations import KEPT, Finding
 from ros_3d_bb.diagnosis.roles import BOXES2D, BOXES3D, COLOR, DEPTH, IMAGES, INFO, TRACKS, needed_images
-from ros_3d_bb.diagnosis.tf_tree import (clock_fault_of_tf, frames_in, is_fixed_root, optical_frame_fix, pose_fix,
-                                         root_of, why_missing)
+from ros_3d_bb.diagnosis.tf_tree import (clock_fault_of_tf, frames_in, is_fixed_root, is_height_of, optical_frame_fix,
+                                         pose_fix, root_of, why_missing)
 from ros_3d_bb.diagnosis.topic_faults import (LATE_S, MIN_PAIRED, MIN_RATE_HZ, NO_CLOCK, clock_fault, paired_share,
                                               publishers_fault, silence_fault, span)
 
@@ -181,10 +181,10 @@ def _mount(seen):
     mount, tf = seen.mount, seen.tf
     if mount is None:
         return
-    if mount.factors:
-        factor = _factor(mount, tf)
+    factor = _factor(mount, tf)
+    if factor is not None:
         yield Finding('depth unit', '', '%d people are found in %d images, and %d if depth is multiplied by %g'
-                      % (mount.people[0], mount.images, mount.factors[factor], factor),
+                      % (mount.people[0], mount.images, mount.factors[factor][0], factor),
                       'set depth_scale: %g in config/bbox3d.yaml, config/tracker.yaml and, for detector:=depth, '
                       'config/depth_detector.yaml' % (factor * seen.depth.converted.scale_m))
     if tf is None or not tf.fault:
@@ -199,12 +199,12 @@ def _mount(seen):
 
 
 def _factor(mount, tf):
-    """Return the factor of depth with which the floor is as far below the camera as by tf; without tf, that with which
-    most people are found."""
-    if mount.pose is None or tf is None or tf.root_from_camera is None:
-        return max(mount.factors, key=mount.factors.get)
-    wanted = tf.root_from_camera[2, 3] / mount.pose.height_m
-    return min(mount.factors, key=lambda factor: max(factor / wanted, wanted / factor))
+    """Return the factor of depth with which most people are found, and the camera is as high above the floor as by tf,
+    if tf has its pose. None if there is none."""
+    is_pose_known = tf is not None and not tf.fault
+    people = {factor: count for factor, (count, pose) in mount.factors.items()
+              if not is_pose_known or is_height_of(tf, pose)}
+    return max(people, key=people.get) if people else None
 
 
 def _pairs_of_boxes(seen):

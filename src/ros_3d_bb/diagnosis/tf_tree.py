@@ -59,12 +59,16 @@ def is_fixed_root(tf, mount):
     """
     if root_of(tf.links, tf.source) in ROBOT_FRAMES or tf.moves:
         return True
-    if tf.root_from_camera is None or mount is None or mount.pose is None:
+    if mount is None or not is_height_of(tf, mount.pose):
         return False
     normal = tf.root_from_camera[2, :3]  # z axis of the root in the optical frame
-    tilt_rad, height_m = np.arctan2(-normal[2], np.hypot(normal[0], normal[1])), tf.root_from_camera[2, 3]
-    return (abs(tilt_rad - mount.pose.tilt_rad) < SAME_TILT_RAD
-            and abs(height_m - mount.pose.height_m) < SAME_HEIGHT * mount.pose.height_m)
+    return abs(np.arctan2(-normal[2], np.hypot(normal[0], normal[1])) - mount.pose.tilt_rad) < SAME_TILT_RAD
+
+
+def is_height_of(tf, pose):
+    """Whether a CameraPose, None if it is unknown, has the height of the camera in the root of tf, by a TfSeen."""
+    return (tf.root_from_camera is not None and pose is not None
+            and abs(tf.root_from_camera[2, 3] - pose.height_m) < SAME_HEIGHT * pose.height_m)
 
 
 def why_missing(links, target, source, stamp_s, mount=None, is_fixed=None):
