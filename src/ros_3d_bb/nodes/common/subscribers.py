@@ -8,10 +8,10 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Int32MultiArray
 
 from ros_3d_bb.conversions.camera_msgs import IMAGE_KINDS, info_of_images
+from ros_3d_bb.core.senders import Senders, sender_of
 from ros_3d_bb.core.time_jumps import TimeJumps
 from ros_3d_bb.diagnosis.roles import role_named
 from ros_3d_bb.diagnosis.observations import Stream
-from ros_3d_bb.core.senders import Senders, sender_of
 from ros_3d_bb.diagnosis.topic_faults import NO_CLOCK, clock_fault, publishers_fault, silence_fault
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.common.master import NO_ANSWER, published_topics, publishers_of
