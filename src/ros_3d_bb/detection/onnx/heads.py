@@ -158,15 +158,16 @@ def _head_of(output, input_hw, grid, metadata):
 
 def _head_of_final(rows, metadata):
     """Name of the head whose rows contain a box, its score and its class number. Raises ValueError if it is unknown."""
-    boxes = rows[:, :4]
     if rows.shape[1] == 6 and metadata.get('head') == RTDETR:
         return 'rtdetr'
-    if not boxes.any() or boxes.max() > 1:  # pixels
+    boxes = rows[rows[:, 4] > 0, :4]  # other rows are padding
+    if not len(boxes) or boxes.max() > 1:  # pixels
         return 'end-to-end'
-    if (boxes[:, 2:] < boxes[:, :2]).any():  # width and height; corners are in order
-        return 'rtdetr'
-    raise ValueError('its boxes are from 0 to 1; corners in pixels of its input, or centres, widths and heights relative '
-                     'to it expected')
+    sides = boxes[:, 2:] - boxes[:, :2]
+    if (sides > 0).all():
+        raise ValueError('its boxes are from 0 to 1; corners in pixels of its input, or centres, widths and heights '
+                         'relative to it expected')
+    return 'rtdetr' if (sides < 0).any() else 'end-to-end'  # corners are in order, width and height are not
 
 
 def _class_count(head, shapes, metadata, names):
