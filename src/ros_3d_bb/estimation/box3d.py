@@ -43,7 +43,8 @@ class Box3D(NamedTuple):
     source rectangle; `support` is the share 0..1 of the samples with depth that belong to its depth layer;
     `truncated_edges` states whether the left, upper, right and lower edge of the rectangle touch the image border;
     `covariance_m2` (3, 3) is that of the centre, None if unknown; `label` is the class name, and `score` is that of the
-    rectangle, 0..1, 0 if unknown; `largest_m` are the upper bounds of width and height.
+    rectangle, 0..1, 0 if unknown; `largest_m` are the upper bounds of width and height; `appearance` are the colours of
+    the clothes (`appearance.appearance_of`), None if unknown.
     """
 
     center_m: np.ndarray
@@ -55,6 +56,7 @@ class Box3D(NamedTuple):
     label: str = PERSON
     score: float = 0.0
     largest_m: Tuple[float, float] = (MAX_SIZE_M, MAX_SIZE_M)
+    appearance: Optional[Tuple[float, ...]] = None
 
     @property
     def truncated(self):

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.tracking.appearance import MOST_ALIKE, evidence_of_pairs
 from ros_3d_bb.tracking.kalman_filter import as_outlier, weighted
 from ros_3d_bb.tracking.track import LEGS_M, MIN_TRACK_SCORE, Track, log_odds_of, log_odds_of_arrival
 
@@ -49,25 +50,28 @@ def associate(tracks, measurements, stamp_ns, params, outliers):
 
 def allowed_costs(tracks, measurements, params, outliers):
     """The costs {(number of the track, number of the measurement): cost} of the allowed pairs, less that of a new
-    target: -log of the density of the measurement given the track, per m², and the cost of their heights; and the set
-    of the pairs that fit better if the measurement is nearer than the track by the offset of outliers.
+    target: -log of the density of the measurement given the track, per m², the cost of their heights, and the evidence
+    of their appearance; and the set of the pairs that fit better if the measurement is nearer than the track by the offset of outliers.
     """
-    gates = [_gate(measurement, params.new_target_density, outliers) for measurement in measurements]
+    evidence = evidence_of_pairs(tracks, measurements)
+    most = MOST_ALIKE if evidence else 0.0
+    gates = [_gate(measurement, params.new_target_density, outliers, most) for measurement in measurements]
     is_crowd = len(tracks) * len(measurements) >= CROWD
     pairs = (_likely_pairs_of_crowd if is_crowd else _likely_pairs)(tracks, measurements, gates, outliers)
     costs, nearer = {}, set()
     for row, column, cost, is_nearer in pairs:
         track, measurement = tracks[row], measurements[column]
-        cost += height_cost(track, measurement, params.height_sigma)
-        if cost < gates[column][0] and track.kind.group == measurement.kind.group:
-            costs[row, column] = cost - gates[column][0]
+        cost += height_cost(track, measurement, params.height_sigma) - evidence.get((row, column), 0.0)
+        limit = gates[column][0] - most
+        if cost < limit and track.kind.group == measurement.kind.group:
+            costs[row, column] = cost - limit
             if is_nearer:
                 nearer.add((row, column))
     return costs, nearer
 
 
-def _gate(measurement, new_target_density, outliers):
-    """The cost of a new target, and two lengths for a first look: a pair is above this cost from the distance
+def _gate(measurement, new_target_density, outliers, evidence):
+    """The cost of a new target plus the most evidence of an appearance, and two lengths for a first look: a pair is above this cost from the distance
     `factor` * sqrt(tr P) + `reach` on, where P is the covariance of the position of the track.
 
     The cost of a new target is -log of its density; at least that of a measurement whose own noise makes every density
@@ -77,7 +81,7 @@ def _gate(measurement, new_target_density, outliers):
     tr P and tr R. Outliers are nearer by their offset, and have a larger R.
     """
     determinant = measurement.xx * measurement.yy - measurement.xy * measurement.xy
-    limit = -math.log(min(new_target_density, UNSURE_SHARE / (2 * math.pi * math.sqrt(determinant))))
+    limit = -math.log(min(new_target_density, UNSURE_SHARE / (2 * math.pi * math.sqrt(determinant)))) + evidence
     factor = math.sqrt(max(2 * (limit - LOG_TWO_PI) - math.log(determinant), 0))
     reach = factor * math.sqrt(measurement.xx + measurement.yy + outliers.spread_m2) + outliers.offset_m
     return limit, factor, reach

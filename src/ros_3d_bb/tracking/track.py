@@ -18,6 +18,7 @@ import numpy as np
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking import kalman_filter
+from ros_3d_bb.tracking.appearance import LEAST_SUPPORT, Appearance
 from ros_3d_bb.tracking.types import NOT_DETECTED, OUT_OF_VIEW, VISIBLE, TrackedObject, prediction_times_s
 
 # All are chosen; `./run bench tracking` and `./run bench scenes` show the effect of others.
@@ -147,7 +148,8 @@ class Track(object):
     that has the most of the filtered scores `votes`; `score` is the filtered score of the detections, `detection` the
     `Detection.index` in the latest image. `innovation_m` is that of the latest image if its noise is assumed, otherwise
     0. `slow_mps` is the velocity, filtered over `SLOW_S`. `misplaced` are the log odds that outliers have moved this
-    track. `is_moving` is whether it moved at the latest detection.
+    track. `is_moving` is whether it moved at the latest detection. `appearance` is the `Appearance`, None if unknown,
+    and `met` are the IDs of the tracks that were detected in an image together with this one.
     """
 
     def __init__(self, track_id, measurement, stamp_ns, camera, speed_mps, log_odds):
@@ -168,6 +170,8 @@ class Track(object):
         self.slow_mps, self.misplaced = (0.0, 0.0), 0.0
         self.log_odds, self.is_confirmed, self.is_moving = log_odds, False, False
         self.votes = {measurement.kind.label: _vote(detection.score)}
+        self.appearance, self.met = None, frozenset()
+        self._update_appearance(detection)
 
     def predicted(self, elapsed_s, acceleration):
         """A copy of this track `elapsed_s` later, not detected, given the acceleration density of people."""
@@ -208,6 +212,7 @@ class Track(object):
         self.is_moving = math.hypot(state.u, state.v) >= limit_mps
         self._update_size(measurement, stamp_ns)
         self._update_class(measurement.kind, detection.score, rules.kinds)
+        self._update_appearance(detection)
 
     def _in_place(self, measurement, latest, period_s, outliers):
         """Resolve a measurement that is nearer than this track by the offset of outliers. Returns the one to use.
@@ -274,6 +279,11 @@ class Track(object):
                        max(height_m + upper_m - lower_m, LEAST_HEIGHT_M))
         self.z_m += (lower_m + upper_m) / 2
         self.z_m2 += (lower_share + upper_share) / 2 * (measurement.zz - self.z_m2)
+
+    def _update_appearance(self, detection):
+        """Average the colours of the clothes."""
+        if detection.appearance is not None and detection.support >= LEAST_SUPPORT:
+            self.appearance = (self.appearance or Appearance()).updated(detection.appearance)
 
     def _update_class(self, kind, score, kinds):
         """Filter the score, and those of the classes of the group: the mean of the first detections, then a first-order

@@ -15,6 +15,7 @@ from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.tracking.appearance import departed_after, meet, returned
 from ros_3d_bb.tracking.association import NEW_NS, associate, duplicates, initiate
 from ros_3d_bb.tracking.manoeuvres import match_manoeuvres
 from ros_3d_bb.tracking.measurement_model import (BOX_ERRORS, DEFAULT_RANGE_M, BoxNoise, Kinds, NoiseParams,
@@ -85,6 +86,7 @@ class _State(NamedTuple):
     cameras: dict
     log_noise_scale: float
     untracked_boxes: int
+    departed: tuple = ()
 
 
 class Tracker(object):
@@ -184,12 +186,18 @@ class Tracker(object):
         if missed:
             mark_missed(missed, tracks, before.tracks, cameras, image.view.camera, observed_s,
                         self._detector.detection_probability)
-        tracks, untracked_boxes = self._delete(tracks, image.stamp_ns)
+        tracks, deleted = self._delete(tracks, image.stamp_ns)
+        departed = departed_after(before.departed, deleted, image.stamp_ns)
+        meet([track for track, _measurement in matches])
+        for track, _measurement in matches:
+            if track.is_confirmed and track.appearance is not None and track.appearance.is_new:
+                tracks, departed = _recognised(track, tracks, departed)
         if len(matches) < len(measurements):
             taken = set(number for _is_confirmed, number in matched.values())
             unmatched = [measurement for measurement in measurements if measurement.number not in taken]
             tracks += initiate(tracks, unmatched, image, period_s, self._params[0], self._rules, assign_id)
-        state = _State(tracks, image.stamp_ns, cameras, log_noise_scale, before.untracked_boxes + untracked_boxes)
+        untracked_boxes = before.untracked_boxes + sum(track.hits for track in deleted if not track.is_confirmed)
+        state = _State(tracks, image.stamp_ns, cameras, log_noise_scale, untracked_boxes, departed)
         return state, [(track_id,) + match for track_id, match in matched.items()]
 
     def _predict(self, before, stamp_ns):
@@ -223,16 +231,25 @@ class Tracker(object):
         return cameras
 
     def _delete(self, tracks, stamp_ns):
-        """The tracks that are kept, tentative ones for a short time only; and the number of boxes of the tentative
-        tracks that end."""
-        max_age_s, kept, untracked_boxes, duplicate_ids = self._params[0].max_age, [], 0, ()
+        """The tracks that are kept, tentative ones for a short time only; and those that end."""
+        max_age_s, kept, deleted, duplicate_ids = self._params[0].max_age, [], [], ()
         if tracks and stamp_ns - max(tracks, key=FIRST_SEEN).first_ns < NEW_NS:
             duplicate_ids = duplicates(tracks, stamp_ns)
         for track in tracks:
             limit_s = max_age_s if track.is_confirmed else TENTATIVE_TIMEOUT_S
             is_recent = not track.unseen_s or track.unseen_s < limit_s
-            if is_recent and track.state.position_m2 < MAX_POSITION_STD_M ** 2 and track.id not in duplicate_ids:
-                kept.append(track)
-            elif not track.is_confirmed:
-                untracked_boxes += track.hits
-        return kept, untracked_boxes
+            is_kept = is_recent and track.state.position_m2 < MAX_POSITION_STD_M ** 2 and track.id not in duplicate_ids
+            (kept if is_kept else deleted).append(track)
+        return kept, deleted
+
+
+def _recognised(track, tracks, departed):
+    """Give a new track the ID of the person who has returned, if there is one. Returns the tracks without the former
+    one of this person, and the departed without this person."""
+    person = returned(track, [other for other in tracks if other.is_confirmed and other is not track], departed)
+    if person is None:
+        return tracks, departed
+    track.id, track.first_ns, track.appearance = person.id, person.first_ns, person.appearance
+    track.met = track.met | person.met
+    return ([other for other in tracks if other is track or other.id != person.id],
+            tuple(other for other in departed if other.id != person.id))

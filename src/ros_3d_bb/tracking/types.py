@@ -34,6 +34,7 @@ class Detection(NamedTuple):
     label: str = PERSON
     score: float = 0.0
     index: int = NOT_DETECTED
+    appearance: Optional[Tuple[float, ...]] = None
     is_ignored: bool = False
 
 
@@ -65,7 +66,7 @@ def detections_from_boxes(boxes, fixed_from_camera, classes=ObjectClasses()):
         detections.append(Detection(
             position_m, (width_m, width_m, height_m), covariance_m2,
             box.truncated_edges[-turns:] + box.truncated_edges[:-turns], box.support or 1.0,  # 0: unknown
-            classes.standard_name(box.label), box.score, index))
+            classes.standard_name(box.label), box.score, index, box.appearance))
     return detections
 
 

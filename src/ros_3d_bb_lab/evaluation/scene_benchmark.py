@@ -11,6 +11,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import Detections, iou
 from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.depth.ground_plane import floor_from_transform
+from ros_3d_bb.estimation.appearance import appearance_of
 from ros_3d_bb.estimation.box3d import plausible
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
@@ -62,20 +63,21 @@ def track_frame(tracker, frame, detected, stamp_ns, camera, error_model):
     tracks.
     """
     depth, map_from_camera = DepthImage(frame.depth_mm, 0.001), frame.poses.map_from_camera
-    found = boxes3d_of(detected, depth, camera, map_from_camera, error_model)
+    found = boxes3d_of(detected, frame.color, depth, camera, map_from_camera, error_model)
     return tracker.update(stamp_ns, detections_from_boxes(dict(enumerate(found)), map_from_camera),
                           view_of(depth, camera, map_from_camera, frame.camera))
 
 
-def boxes3d_of(detected, depth, camera, fixed_from_camera, error_model=None):
+def boxes3d_of(detected, color, depth, camera, fixed_from_camera, error_model=None):
     """The list of plausible `box3d.Box3D` of the Detections in an image, as of bbox3d_node."""
     rects_px = np.rint(detected.boxes).astype(int)
     usable = (rects_px[:, :2] < rects_px[:, 2:]).all(axis=1)
     estimated = estimate_boxes(depth, list(map(tuple, rects_px[usable].tolist())), camera,
                                estimator_named('foreground'),
                                level_from_camera=level_rotation(fixed_from_camera[2, :3]))
-    return corrected_boxes([box._replace(score=score) for box, score in zip(estimated, detected.scores[usable])
-                            if plausible(box)], error_model)
+    boxes = [box._replace(score=score, appearance=appearance_of(box, color, depth, camera))
+             for box, score in zip(estimated, detected.scores[usable]) if plausible(box)]
+    return corrected_boxes(boxes, error_model)
 
 
 def view_of(depth, camera, fixed_from_camera, name):

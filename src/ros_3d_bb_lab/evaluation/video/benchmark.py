@@ -44,7 +44,7 @@ def track_video(video, pose, detect, rate_hz, trackers):
     """
     for number, (name, color, depth) in enumerate(video.read()):
         detected = detect(color, depth)
-        found = dict(enumerate(boxes3d_of(detected, depth, video.camera, pose)))
+        found = dict(enumerate(boxes3d_of(detected, color, depth, video.camera, pose)))
         located, view = detections_from_boxes(found, pose), view_of(depth, video.camera, pose, 'camera')
         stamp_ns = START_NS + int(round(number * NS / rate_hz))
         tracks = {key: tracker.update(stamp_ns, located, view) for key, tracker in trackers.items()}
