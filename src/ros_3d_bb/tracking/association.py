@@ -51,7 +51,8 @@ def associate(tracks, measurements, stamp_ns, params, outliers):
 def allowed_costs(tracks, measurements, params, outliers):
     """The costs {(number of the track, number of the measurement): cost} of the allowed pairs, less that of a new
     target: -log of the density of the measurement given the track, per m², the cost of their heights, and the evidence
-    of their appearance; and the set of the pairs that fit better if the measurement is nearer than the track by the offset of outliers.
+    of their appearance; and the set of the pairs that fit better if the measurement is nearer than the track by the
+    offset of outliers.
     """
     evidence = evidence_of_pairs(tracks, measurements)
     most = MOST_ALIKE if evidence else 0.0
@@ -71,8 +72,9 @@ def allowed_costs(tracks, measurements, params, outliers):
 
 
 def _gate(measurement, new_target_density, outliers, evidence):
-    """The cost of a new target plus the most evidence of an appearance, and two lengths for a first look: a pair is above this cost from the distance
-    `factor` * sqrt(tr P) + `reach` on, where P is the covariance of the position of the track.
+    """The cost of a new target plus the most `evidence` of an appearance, and two lengths for a first look: a pair is
+    above this cost from the distance `factor` * sqrt(tr P) + `reach` on, where P is the covariance of the position of
+    the track.
 
     The cost of a new target is -log of its density; at least that of a measurement whose own noise makes every density
     low: an uncertain detection fits a new target and a track about equally well, and the track takes precedence. The

@@ -38,8 +38,8 @@ MIN_TRACK_SCORE = -2.0  # with less (12 % probability), tracks do not start, and
 SMOOTHING = 0.1  # weight of the newest detection in size, height and score
 SMOOTHED_HITS = 10  # number of detections from which on their mean has this weight
 CUT_SMOOTHING = 0.02  # the same for boxes that the image border truncates sideways: the head may be outside
-# Difference of the lower ends of a box and of its track from which on one of them does not show the legs; and weight of a
-# box that does. Chosen: heights of people differ by less.
+# Difference of the lower ends of a box and of its track from which on one of them does not show the legs, and the
+# weight of a box that does. Chosen: heights of people differ by less.
 LEGS_M, SHOWN_SMOOTHING = 0.2, 0.5
 CUT_LASTS_NS = NS // 2  # hysteresis: an end is visible again this long after it was last truncated
 LEAST_HEIGHT_M = 0.1
