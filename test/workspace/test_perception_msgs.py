@@ -134,7 +134,8 @@ def detection_of(box, roll_deg=0, pitch_deg=0, yaw_deg=0):
 @pytest.mark.parametrize('covariance_m2', [None, np.diag([0.01, 0.04, 0.09])])
 def test_3d_boxes_survive(covariance_m2):
     sent = Box3D(np.array([0.1, 0.2, 3.0]), np.array([0.5, 1.7, 0.5]), (10, 20, 64, 48), 0.75,
-                 (False, False, True, True), covariance_m2, 'dog', 0.625)
+                 (False, False, True, True), covariance_m2, 'dog', 0.625,
+                 appearance=(0.25, 0.5, 4.0, -0.5, 0.125, 3.5) if covariance_m2 is None else None)
     camera = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
     boxes, _faults = usable_boxes3d(on_the_wire(boxes3d_to_msg([sent], header_at(1), camera)))
     back = boxes[0]
@@ -158,7 +159,8 @@ def test_intrinsics_are_those_of_the_cropped_and_decimated_images():
     {'x_m': float('nan')}, {'x_m': 1e300}, {'width_m': 0.0}, {'width_m': float('nan')}, {'width_m': 10.0},
     {'height_m': 10.93}, {'covariance_m2': -np.eye(3)}, {'covariance_m2': np.full((3, 3), np.nan)},
     {'covariance_m2': 1e308 * np.eye(3)}, {'covariance_m2': [[1, 5, 0], [5, 1, 0], [0, 0, 1]]},
-    {'score': np.nan}, {'score': -0.1}, {'score': 1.5}, {'label': 'a;b'}, {'label': 'x' * 65}, {'label': u'\u9f8d'}])
+    {'appearance': [0.0] * 5}, {'appearance': [np.inf] * 6}, {'score': np.nan}, {'score': -0.1},
+    {'score': 1.5}, {'label': 'a;b'}, {'label': 'x' * 65}, {'label': u'\u9f8d'}])
 def test_an_unusable_3d_box_does_not_affect_the_others(wrong):
     good, other = box_of(x_m=-1.0), box_of(x_m=2.0, width_m=9.99, covariance_m2=np.eye(3))
     usable, faults = usable_boxes3d(BoundingBox3DArray(header=header_at(7), boxes=[good, box_of(**wrong), other]))

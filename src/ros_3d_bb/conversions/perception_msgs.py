@@ -23,6 +23,7 @@ NEWEST = genpy.Time(0)  # tf returns the latest transform for stamp 0
 LATEST_NS = 2 ** 31 * NS  # limit of stamps, as their differences must fit into a ROS duration
 EDGE_FLAGS = BoundingBox3D.LEFT, BoundingBox3D.TOP, BoundingBox3D.RIGHT, BoundingBox3D.BOTTOM
 ROUNDING = 1e-9  # tolerance of eigenvalues of a covariance, relative to its largest element if that exceeds 1
+APPEARANCE_NUMBERS = 6  # see BoundingBox3D.msg
 MAX_BOXES = 1000  # more boxes in one image are an error of the publisher and would stall the pipeline
 # Classes and scores follow the frame in the label of 2D boxes; frames may contain semicolons.
 CLASSES = re.compile(r'(?:;classes=([^;]*))?(?:;scores=([^;]*))?\Z')
@@ -35,7 +36,8 @@ class Boxes2D(NamedTuple):
     """The 2D boxes of one image: (n, 4) integer pixels x1, y1, x2, y2, and the stamp and frame of the image.
 
     `stamp_ns` is None for a plain array, which does not identify its image. `labels` are the class names of the boxes;
-    `scores` (n,) are 0..1, 0 if unknown. `image_size` is the (width, height) of the image, None if unknown.
+    `scores` (n,) are 0..1, 0 if unknown. `image_size` is the (width, height) of the image, None if unknown. `color` is
+    the image, RGB (height, width, 3), if it is known.
     """
 
     boxes: np.ndarray
@@ -44,6 +46,7 @@ class Boxes2D(NamedTuple):
     labels: Tuple[str, ...]
     scores: np.ndarray
     image_size: Optional[Tuple[int, int]] = None
+    color: Optional[np.ndarray] = None
 
 
 def time_from(stamp_ns):
@@ -221,6 +224,7 @@ def boxes3d_to_msg(boxes, header, camera):
         _set_xyz(message.size, box.size_m.tolist())
         if box.covariance_m2 is not None:
             message.position_covariance = np.ravel(box.covariance_m2).tolist()
+        message.appearance = box.appearance or ()
         x1, y1, x2, y2 = box.rect_px
         x1, x2 = min(max(x1, 0), camera.width), min(max(x2, 0), camera.width)
         y1, y2 = min(max(y1, 0), camera.height), min(max(y2, 0), camera.height)
@@ -238,7 +242,7 @@ def _box3d_from_msg(box):
     if box.truncated and not any(edges):
         edges = (True,) * len(EDGE_FLAGS)  # the truncated edges are unknown, so no edge is trusted
     return Box3D(_xyz(box.center.position), _xyz(box.size), rect_px, box.support, edges, covariance_m2,
-                 box.label or PERSON, box.score)
+                 box.label or PERSON, box.score, appearance=tuple(box.appearance) or None)
 
 
 def usable_boxes3d(message):
@@ -268,6 +272,9 @@ def _box3d_fault(box, position_covariance):
     if not _is_covariance(position_covariance):
         return ('the position_covariance %s; a finite, positive semi-definite matrix, or zeros where it is not known, '
                 'expected' % list(position_covariance))
+    if box.appearance is not None and not (
+            len(box.appearance) == APPEARANCE_NUMBERS and np.isfinite(box.appearance).all()):
+        return 'the appearance %s; %d finite numbers expected' % (list(box.appearance), APPEARANCE_NUMBERS)
     return label_fault(box.label) or score_fault(box.score)
 
 

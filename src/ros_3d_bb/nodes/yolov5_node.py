@@ -80,6 +80,6 @@ class Yolov5Node(object):
 
     def _detect(self, message):
         detector = self._detector.with_params(self._params._replace(image_size=self._worker.pace.size))
-        result = detect_in_color(detector, message, self._rotation.turns(message.header.frame_id))
+        image, detections = detect_in_color(detector, message, self._rotation.turns(message.header.frame_id))
         self._diagnostics.count('images processed')
-        return result
+        return image, detections, image

@@ -11,6 +11,7 @@ from ros_3d_bb.core.object_classes import PERSON, PERSON_CLASS, read_object_clas
 from ros_3d_bb.core.params import (CLASSES_FILE, DEPTH, DEPTH_SCALE, IMAGE_ROTATION, LARGEST, STAMP_TOLERANCE, Param,
                                    parameters)
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.estimation.appearance import appearance_of
 from ros_3d_bb.estimation.box3d import REASONS, Rejected
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, error_model_of_param
@@ -92,7 +93,10 @@ class EstimationStage(object):
                 continue
             found.append(box)
             if box.is_plausible:
-                boxes3d.append(box._replace(score=score))
+                appearance = None
+                if frame.color is not None and box.label == PERSON:
+                    appearance = appearance_of(box, frame.color, frame.depth, frame.camera)
+                boxes3d.append(box._replace(score=score, appearance=appearance))
             else:
                 self._warn_of_size(_as_received(box, frame))
         factor = self._scale_check.factor(found)

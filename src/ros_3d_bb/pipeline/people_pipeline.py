@@ -140,7 +140,7 @@ class PeoplePipeline(object):
         self._now_ns = now_ns
         message = self._boxes2d(camera, header, image, detections, names)
         if message is not None:
-            self._cameras[camera].source.add_boxes(message, now_ns)
+            self._cameras[camera].source.add_boxes(message, now_ns, image)
 
     def take_results(self):
         """Return the messages that the nodes would have published since the last call, [(topic, message), ...]."""

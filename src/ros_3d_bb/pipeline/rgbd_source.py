@@ -62,9 +62,9 @@ class RgbdSource(object):
     def add_color(self, message, now_ns):
         self._sync.add_boxes(stamp_of(message), now_ns, message)
 
-    def add_boxes(self, message, now_ns):
-        """Add 2D boxes, a std_msgs/Int32MultiArray."""
-        boxes2d = boxes2d_from_msg(message)
+    def add_boxes(self, message, now_ns, color=None):
+        """Add 2D boxes, a std_msgs/Int32MultiArray, with their image, RGB (height, width, 3), if it is known."""
+        boxes2d = boxes2d_from_msg(message)._replace(color=color)
         if boxes2d.stamp_ns is None:
             self._note_once(UNSTAMPED, 'the 2D boxes have no stamp: each array is paired with the depth image that '
                             'arrived nearest to %.3f s before it (~assumed_delay)' % (self._sync.assumed_delay_ns / NS))
@@ -79,15 +79,15 @@ class RgbdSource(object):
             self._held = None
 
     def frame(self, trigger, depth_msg, camera):
-        """Return the RgbdFrame of matched messages: the colour image, or the Boxes2D in it (the frame then has no
-        colour); the depth image; and the Camera.
+        """Return the RgbdFrame of matched messages: the colour image, or the Boxes2D in it (the frame then has
+        its colour only if they do); the depth image; and the Camera.
 
         Raises ValueError if an image cannot be read, the colour image has another size than its camera_info, or the
         depth image has another size than the camera or cannot be registered.
         """
         depth_stamp_ns = depth_msg.header.stamp.to_nsec()
         if isinstance(trigger, Boxes2D):
-            color, size, stamp_ns = None, trigger.image_size, trigger.stamp_ns or depth_stamp_ns
+            color, size, stamp_ns = trigger.color, trigger.image_size, trigger.stamp_ns or depth_stamp_ns
         else:
             color = imgmsg_to_rgb(trigger)
             size, stamp_ns = color.shape[1::-1], trigger.header.stamp.to_nsec()

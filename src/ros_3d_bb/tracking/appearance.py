@@ -36,7 +36,7 @@ class Appearance(NamedTuple):
         """The Appearance after an image with these colours."""
         mean, images = list(self.mean), list(self.images)
         for part in (0, 1):
-            if math.isfinite(colors[3 * part]):
+            if colors[3 * part + 2]:
                 images[part] = min(images[part] + 1, MOST_IMAGES)
                 for place in range(3 * part, 3 * part + 3):
                     mean[place] += (colors[place] - mean[place]) / images[part]
@@ -56,7 +56,7 @@ class Appearance(NamedTuple):
         """Likelihood ratios of the colours (6,) of a box, for this person against any other one: of the upper and of
         the lower body, None where it is unknown."""
         return tuple(_ratio(self.mean[start:start + 3], colors[start:start + 3], images)
-                     if images and math.isfinite(colors[start]) else None
+                     if images and colors[start + 2] else None
                      for start, images in zip((0, 3), self.images))
 
 
@@ -139,7 +139,7 @@ def returned(track, others, departed):
     never been seen together may be the same person.
     """
     candidates = [Departed.of(other) for other in others if other.appearance is not None] + list(departed)
-    ratios = {person.id: person.appearance.ratios(_colors_of(track.appearance))
+    ratios = {person.id: person.appearance.ratios(track.appearance.mean)
               for person in candidates if person.group == track.kind.group}
     possible = [person for person in candidates if person.id in ratios and person.id not in track.met
                 and person.appearance.is_known and _can_return(person, track)]
@@ -152,10 +152,6 @@ def returned(track, others, departed):
         if ratio is not None:
             likelihood *= ratio / (1 + sum(other[part] or 0 for other in alike))
     return best if likelihood >= RETURN_ODDS else None
-
-
-def _colors_of(appearance):
-    return tuple(value if appearance.images[place // 3] else math.nan for place, value in enumerate(appearance.mean))
 
 
 def _can_return(person, track):

@@ -50,7 +50,7 @@ class RgbdInputs(object):
 
     def receiver(self, inputs, add):
         """Return a callback that passes a message, with its arrival time, to an `add_` method of the source."""
-        def on_message(message):
+        def on_message(message, *others):
             with self._diagnostics.receiving(inputs), self.lock:
-                add(message, arrival_clock_ns())
+                add(message, arrival_clock_ns(), *others)
         return on_message
