@@ -65,8 +65,19 @@ class Estimation(object):
     def add_depth(self, depth, header=HEADER, encoding='32FC1'):
         self._source.add_depth(fill_image(Image(header=header), depth, encoding), 0)
 
-    def add_boxes(self, rects_px, labels=None, scores=None, header=HEADER, image_size=None):
-        self._source.add_boxes(boxes2d_to_msg(np.array(rects_px), header, labels, scores, image_size), 0)
+    def add_boxes(self, rects_px, labels=None, scores=None, header=HEADER, image_size=None, color=None):
+        self._source.add_boxes(boxes2d_to_msg(np.array(rects_px), header, labels, scores, image_size), 0, color)
+
+
+@pytest.mark.parametrize('color', [None, (40, 90, 120)])
+def test_boxes_with_their_image_have_the_colours_of_clothes(color):
+    run = Estimation(Bbox3dParams(), EventCounter())
+    run.add_depth(scene(6.0))
+    image = None if color is None else np.full((480, 640, 3), color, np.uint8)
+    run.add_boxes([PERSON_PX], color=image)
+    red, green, blue = np.log(np.array(color or (0, 0, 0)) + 8.0)
+    expected = (red - green, blue - green, (red + green + blue) / 3)
+    assert run.boxes3d[0].appearance == (None if color is None else pytest.approx(2 * expected))
 
 
 def test_each_image_has_the_tilt_of_the_camera_at_its_time():

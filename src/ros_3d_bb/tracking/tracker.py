@@ -71,14 +71,15 @@ class TrackerParams(NamedTuple):
     max_age: float = Param(
         4.0, 'A person who is not detected for longer than this gets a new track ID. So does one who reappears where a '
         'new target is more likely: with the default parameters after 3 s, except for people who stop behind an '
-        'occluder. With 0, every missed person gets a new ID.', 's', live=(0, 30))
+        'occluder. People whose clothes are recognised keep theirs. With 0, every missed person gets a new ID.', 's', live=(0, 30))
     moving_speed: float = Param(
         0.2, 'A person counts as moving from this speed on, and then down to half of it.', 'm/s', live=(0, 1))
 
 
 class _State(NamedTuple):
     """State of the tracker after an image: the tracks, the stamp of the latest image, the `CameraState` of each camera,
-    the learned `measurement_model.learned_log_scale`, and the number of boxes whose tracks ended unpublished.
+    the learned `measurement_model.learned_log_scale`, the number of boxes whose tracks ended unpublished, and the people
+    who may return, `appearance.Departed`.
     """
 
     tracks: Sequence[Track]
@@ -187,7 +188,7 @@ class Tracker(object):
             mark_missed(missed, tracks, before.tracks, cameras, image.view.camera, observed_s,
                         self._detector.detection_probability)
         tracks, deleted = self._delete(tracks, image.stamp_ns)
-        departed = departed_after(before.departed, deleted, image.stamp_ns)
+        departed = departed_after(before.departed, deleted, image.stamp_ns) if self._params[0].max_age else ()
         meet([track for track, _measurement in matches])
         for track, _measurement in matches:
             if track.is_confirmed and track.appearance is not None and track.appearance.is_new:
