@@ -1,12 +1,16 @@
+import functools
+
 import numpy as np
 import pytest
 
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.measurement_model import NoiseParams
+from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.track import PredictionParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
-from support.people import START_NS, VIEW, all_ids, at, ids, noisy, play, standing, view_from
+from support.people import CAMERA, START_NS, VIEW, all_ids, at, ids, noisy, play, standing, view_from
 
 
 @pytest.mark.parametrize('speed_mps', [0, 1.6])
@@ -243,6 +247,24 @@ def test_new_parameters_apply_from_the_next_image_on_and_tracks_are_kept():
     tracker.reconfigure(TrackerParams(max_age=0.5), NoiseParams(), PredictionParams())
     assert play(tracker, 0.1, standing(), start_s=2)[-1] == []
     assert ids(play(tracker, 1, standing((3, 0)), start_s=3)[-1]) == [number + 1]
+
+
+@pytest.mark.parametrize('start,end', [((3, 0), (0.45, -0.1)), ((3, 0), (0.41, -0.27)), ((3.5, 1.8), (0.5, 0.3))])
+@pytest.mark.parametrize('depth_mm,stays', [(5000, False), (0, True)])
+def test_who_passes_the_camera_does_not_stay_before_it(start, end, depth_mm, stays):
+    """The camera looks past the person, who is beside or behind it, or is covered by one who stands before it."""
+    depth = DepthImage(np.full((480, 640), depth_mm, np.uint16), 0.001)
+    view = VIEW._replace(depth_at=functools.partial(depths_towards, CAMERA, depth))
+
+    def walk(time_s):
+        way = np.array(end) - start
+        return [at(*start + way * time_s / 2)] if time_s <= 2 else []
+
+    published = play(Tracker(), 6, walk, rate_hz=5, view=view)
+    last = [objects for objects in published[10:] if objects]
+    assert len(last) >= 18 if stays else len(last) <= 10
+    distance_m = np.hypot(*last[-1][0].position_m[:2])
+    assert distance_m < 0.6 if stays else distance_m > 1
 
 
 @pytest.mark.parametrize('first', ['hidden', 'whole'])

@@ -30,6 +30,9 @@ PRESENT_SHARE = 0.3  # of the measured depth; legs fill no more of the width of 
 # Depth sample points, in half extents.
 ACROSS, ALONG = np.meshgrid((-0.6, -0.3, 0, 0.3, 0.6), (-0.8, -0.4, 0, 0.4, 0.8))
 
+# The same for a body that fills the image: in half widths, slopes, and the largest bearing.
+RAYS_ACROSS, RAYS_UP, RAYS_RAD = np.linspace(-0.9, 0.9, 7), (-0.2, 0.0, 0.2), 1.2
+
 STATUS = {VISIBLE: OCCLUDED, OCCLUDED: OCCLUDED, OUT_OF_VIEW: OUT_OF_VIEW, PRESENT: OCCLUDED,
           STAYED: OCCLUDED, SEEN: VISIBLE}
 RECENT_NS = NS  # a camera whose latest image is older is ignored
@@ -126,8 +129,8 @@ def contradicting_cameras(tracks, stamp_ns):
 
 
 def _meets(track, former, view):
-    """Whether someone who walks would pass a camera at the height of the body nearer than `NEAREST_M`, and the depth
-    image does not show that the place of the former State is empty."""
+    """Whether someone who walks would pass a camera at the height of the body nearer than `NEAREST_M`, and may stand at
+    the place of the former State: it is in view, and the depth image does not show that it is empty."""
     if view.depth_at is None or not track.is_moving:
         return False
     camera_x, camera_y, camera_z = view.fixed_from_camera[:3, 3].tolist()
@@ -137,8 +140,25 @@ def _meets(track, former, view):
     is_near = (camera_x - track.state.x) * u + (camera_y - track.state.y) * v < NEAREST_M * speed_mps
     if not (is_ahead and is_near and abs(camera_z - track.z_m) < track.size_m[2] / 2):
         return False
-    seen = _in_depth(view, np.array([[former.x, former.y, track.z_m]]), np.array([track.size_m]))
-    return not seen.empty[0]
+    return not _is_empty(view, former)
+
+
+def _is_empty(view, place):
+    """Whether most of the rays of an image towards a body at the place of a State, so near that it fills the image or a
+    part of it, are measured clearly behind it; also if all of them are outside the image."""
+    (distance_m,), (bearing,) = view.bearings(np.array([(place.x, place.y)]))
+    half_width = math.asin(min(BODY_RADIUS_M / max(distance_m, 0.01), 1))
+    bearings = np.clip(bearing + half_width * RAYS_ACROSS, -RAYS_RAD, RAYS_RAD)
+    ahead = view.ahead
+    left = np.array((-ahead[1], ahead[0]))
+    level = np.cos(bearings)[:, None] * ahead + np.sin(bearings)[:, None] * left
+    directions = np.array([(x, y, up) for x, y in level for up in RAYS_UP])
+    points = directions.dot(view.fixed_from_camera[:3, :3])
+    pixels = view.intrinsics.project(np.where(points[:, 2:] > 0, points, (0, 0, 1)))
+    is_inside = (points[:, 2] > 0) & ((pixels >= 0) & (pixels < view.intrinsics[:2])).all(axis=1)
+    with np.errstate(invalid='ignore'):  # nan is not behind
+        behind = view.depth_at(points[is_inside]) > distance_m + HIDDEN_BEHIND_M
+    return np.count_nonzero(behind) >= HIDDEN_SHARE * np.count_nonzero(is_inside)
 
 
 def _stop(track, former, share):
@@ -269,14 +289,13 @@ def _half_widths(distances_m):
 class _InDepth(NamedTuple):
     """What the depth image shows at the places of people, (n,) bool each.
 
-    Most of the depth measured towards the body is clearly nearer (`hidden`), farther than its axis (`farther`), or
-    clearly farther (`empty`); a part is at its distance (`present`); or none is measured (`unknown`).
+    Most of the depth measured towards the body is clearly nearer (`hidden`) or farther than its axis (`farther`); a
+    part is at its distance (`present`); or none is measured (`unknown`).
     """
 
     hidden: np.ndarray
     present: np.ndarray
     farther: np.ndarray
-    empty: np.ndarray
     unknown: np.ndarray
 
 
@@ -292,9 +311,7 @@ def _in_depth(view, positions_m, sizes_m):
     known = np.isfinite(depths_m)
     behind_m = np.where(known, points[..., 2] - depths_m, np.nan)
     with np.errstate(invalid='ignore'):  # nan is neither
-        each = (behind_m > HIDDEN_BEHIND_M, np.abs(behind_m) <= HIDDEN_BEHIND_M, behind_m < 0,
-                behind_m < -HIDDEN_BEHIND_M)
+        each = behind_m > HIDDEN_BEHIND_M, np.abs(behind_m) <= HIDDEN_BEHIND_M, behind_m < 0
     counts = np.maximum(known.sum(axis=1), ACROSS.size / 3.0)
-    hidden, present, farther, empty = (some.sum(axis=1) / counts for some in each)
-    return _InDepth(hidden > HIDDEN_SHARE, present > PRESENT_SHARE, farther > HIDDEN_SHARE, empty > HIDDEN_SHARE,
-                    ~known.any(axis=1))
+    hidden, present, farther = (some.sum(axis=1) / counts for some in each)
+    return _InDepth(hidden > HIDDEN_SHARE, present > PRESENT_SHARE, farther > HIDDEN_SHARE, ~known.any(axis=1))

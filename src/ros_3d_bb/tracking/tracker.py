@@ -71,15 +71,16 @@ class TrackerParams(NamedTuple):
     max_age: float = Param(
         4.0, 'A person who is not detected for longer than this gets a new track ID. So does one who reappears where a '
         'new target is more likely: with the default parameters after 3 s, except for people who stop behind an '
-        'occluder. People whose clothes are recognised keep theirs. With 0, every missed person gets a new ID.', 's', live=(0, 30))
+        'occluder. People whose clothes are recognised keep theirs. With 0, every missed person gets a new ID.',
+        's', live=(0, 30))
     moving_speed: float = Param(
         0.2, 'A person counts as moving from this speed on, and then down to half of it.', 'm/s', live=(0, 1))
 
 
 class _State(NamedTuple):
     """State of the tracker after an image: the tracks, the stamp of the latest image, the `CameraState` of each camera,
-    the learned `measurement_model.learned_log_scale`, the number of boxes whose tracks ended unpublished, and the people
-    who may return, `appearance.Departed`.
+    the learned `measurement_model.learned_log_scale`, the number of boxes whose tracks ended unpublished, and the
+    people who may return, `appearance.Departed`.
     """
 
     tracks: Sequence[Track]
