@@ -70,7 +70,11 @@ def _ratio(mean, colors, images):
 
 def evidence_of_pairs(tracks, measurements):
     """The evidence {(number of the track, number of the measurement): log-likelihood ratio} that each pair is one
-    person, where both appearances are known, limited to `MOST_ALIKE`."""
+    person, where both appearances are known, from 0 to `MOST_ALIKE`.
+
+    Colours that differ are no evidence against a pair: light, other people and what a person carries change them, and
+    among people who are dressed alike, nothing would outweigh that. Equal ones are seldom a coincidence.
+    """
     known = [(row, track) for row, track in enumerate(tracks) if track.appearance is not None]
     found = {}
     for column, measurement in enumerate(measurements if known else ()):
@@ -80,7 +84,7 @@ def evidence_of_pairs(tracks, measurements):
             people = [row for row in ratios if tracks[row].is_confirmed]
             for row in ratios:
                 evidence = _evidence(ratios[row], [ratios[other] for other in people if other != row])
-                found[row, column] = min(max(evidence, -MOST_ALIKE), MOST_ALIKE)
+                found[row, column] = min(max(evidence, 0.0), MOST_ALIKE)
     return found
 
 
