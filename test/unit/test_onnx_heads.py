@@ -56,7 +56,8 @@ def test_networks_that_suppress_are_known_by_their_metadata():
 
 def test_boxes_relative_to_the_input_are_those_of_rtdetr_or_rejected():
     """With metadata, the widths and heights of RT-DETR need not show in the values."""
-    rows = np.array([[(0.2, 0.2, 0.6, 0.8, 0.9, 0)]])
+    rows = np.zeros((1, 300, 6))  # most are padding
+    rows[0, 0] = 0.2, 0.2, 0.6, 0.8, 0.9, 0
     assert layout_of([rows], HW, {'head': 'RTDETRDecoder', 'end2end': 'True'}).head == 'rtdetr'
     for metadata in ({}, {'end2end': 'True'}):
         with pytest.raises(ValueError, match='from 0 to 1'):
