@@ -4,11 +4,11 @@ import pytest
 
 from conftest import DATA
 from ros_3d_bb.camera.camera_model import Camera, transform_points
-from ros_3d_bb.camera.images import DepthImage
+from ros_3d_bb.camera.images import DepthImage, mounted_camera
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.depth.detector import DepthPeople
-from ros_3d_bb.detection.depth.ground_plane import Floor
+from ros_3d_bb.detection.depth.ground_plane import Floor, floor_from_transform
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb.tracking.tracker import Tracker
@@ -205,6 +205,47 @@ def test_a_robot_that_drives_up_to_a_person_does_not_lose_the_legs():
         'robot': {'moves': [{'wait': 0.5}, {'to': [1.4, 0.0], 'speed': 0.5}]}}))
     detect = depth_detector(simulator)
     assert all([len(detect(simulator.frame(number)).boxes) == 1 for number in range(simulator.frame_count)])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('place, bounds, floor_error_deg', [
+    ([5.0, 0.3], [-2.0, 5.4, -4.0, 4.0], 0), ([6.0, 0.3], [-2.0, 6.4, -4.0, 4.0], 0),
+    ([4.0, 0.9], [-2.0, 12.0, -1.2, 1.2], 0), ([5.0, 0.3], [-2.0, 9.0, -4.0, 4.0], -3)],
+    ids=['before a wall', 'before a far wall', 'beside a wall', 'with a wrong tilt in tf'])
+def test_a_person_is_found_near_walls_and_above_a_wrong_floor(place, bounds, floor_error_deg):
+    simulator = Simulator(scenario_from({
+        'rate': 5.0, 'room': {'bounds': bounds, 'height': 3.0}, 'robot': {'mount': [0, 0, 1.0]},
+        'people': [{'start': place, 'facing': 3.1, 'height': 1.75}]}))
+    level, tilted = (mounted_camera(0, np.radians(angle_deg), 0)[:3, :3] for angle_deg in (0, floor_error_deg))
+    detector = DepthPeople()
+    for number in range(5):
+        frame = simulator.frame(number)
+        known = floor_from_transform(np.linalg.inv(frame.poses.map_from_camera))
+        known = known._replace(normal=level.T.dot(tilted).dot(known.normal))
+        boxes = detector.detect(frame.color, DepthImage(frame.depth_mm, 0.001), simulator.camera, known).boxes
+        assert len(boxes) == 1 and iou(frame.people[0].box_px, boxes)[0] > 0.5
+        assert (detector.floor is known) == (floor_error_deg == 0)
+        assert np.degrees(np.arccos(detector.floor.normal.dot((0, -1, 0)))) < 0.5
+
+
+def test_the_walls_of_an_empty_corridor_are_not_detected():
+    """The view along a wall shows half a metre of it in each pixel."""
+    simulator = Simulator(scenario_from({
+        'rate': 5.0, 'room': {'bounds': [-1.0, 12.0, -0.8, 0.8], 'height': 2.8},
+        'robot': {'pose': [0.0, 0.4, 0.0], 'mount': [0.0, 0.0, 1.9], 'pitch': 0.33}}))
+    detect = depth_detector(simulator)
+    assert [len(detect(simulator.frame(number)).boxes) for number in range(5)] == [0] * 5
+
+
+def test_a_near_person_whom_the_measured_area_cuts_is_detected():
+    """No depth is known below the hips, and a chair stands beside the person at the same distance."""
+    room, cut = Room(1.4), 360  # a row at the hips
+    person = room.person(0.1, 1.9)
+    room.block(-0.5, 1.9, 0.0, 0.85, 0.3)
+    room.depth_m[cut:] = 0
+    boxes = room.detections().boxes
+    x1, y1, x2, _y2 = room.visible(person)
+    assert_boxes(boxes, [(x1, y1, x2, cut)])
 
 
 def test_furniture_in_the_place_of_a_person_is_not_detected():

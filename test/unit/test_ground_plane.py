@@ -4,7 +4,8 @@ from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.camera.camera_model import Camera, transform_points
 from ros_3d_bb.camera.images import DepthImage
-from ros_3d_bb.detection.depth.ground_plane import MAX_HIGHER, FittedFloor, Floor, fit_floor, floor_from_transform
+from ros_3d_bb.detection.depth.ground_plane import (MAX_HIGHER, FittedFloor, Floor, KnownFloor, fit_floor,
+                                                    floor_from_transform)
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from support.people import mounted
 
@@ -67,6 +68,22 @@ def test_a_table_does_not_replace_the_floor_of_earlier_images():
                  for image in [table, floor] + MAX_HIGHER * [table] + [floor] + (MAX_HIGHER + 1) * [table] + [floor]]
     expected_m = [0.5] + (1 + MAX_HIGHER + 1 + MAX_HIGHER) * [1.2] + [0.5, 1.2]
     np.testing.assert_allclose(heights_m, expected_m, atol=0.02)
+
+
+@pytest.mark.parametrize('known, shown, expected', [
+    (floor_of(0.02, 0, 1.07), floor_of(0.05, 0.02, 1.07), 'shown'),  # the robot brakes
+    (floor_of(0.3, 0, 1.9), floor_of(0.3, 0, 2.0), 'shown'),  # floor_height is wrong
+    (floor_of(0.4, 0, 1.2), floor_of(0.4, 0, 0.5), 'known'),  # a table hides the floor
+    (floor_of(0.3, 0, 1.2), floor_of(0.3, 0, 1.2), 'known')])
+def test_the_floor_with_more_points_on_it_wins_unless_it_is_a_table(known, shown, expected):
+    floor = KnownFloor()
+    corrected = floor.correct(known, DepthImage(depth_of(shown, noise=0.0034), 1.0), CAMERA, DepthPeopleParams())
+    if expected == 'known':
+        assert corrected is known
+    else:
+        np.testing.assert_allclose(corrected.normal, shown.normal, atol=0.01)
+        assert abs(corrected.offset_m - shown.offset_m) < 0.02
+    assert floor.of(known).offset_m == corrected.offset_m
 
 
 def test_the_result_is_none_without_a_floor():

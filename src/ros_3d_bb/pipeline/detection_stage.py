@@ -1,4 +1,5 @@
 """Detection stage: 2D bounding boxes in frames or colour images."""
+import math
 from typing import NamedTuple
 
 import tf2_ros
@@ -10,7 +11,7 @@ from ros_3d_bb.conversions.perception_msgs import stamp_of
 from ros_3d_bb.core.params import (DEPTH, DEPTH_SCALE, ENABLED, IMAGE_ROTATION, PUBLISH_EMPTY, STAMP_TOLERANCE, Param,
                                    parameters)
 from ros_3d_bb.detection.depth.detector import DepthPeople
-from ros_3d_bb.detection.depth.ground_plane import floor_from_transform
+from ros_3d_bb.detection.depth.ground_plane import camera_pose_above, floor_from_transform
 from ros_3d_bb.pipeline.transform_buffer import upright_transform
 
 
@@ -111,5 +112,14 @@ class DepthDetectionStage(object):
             self._events.warn('images without floor', 'tf gives no floor, and none is visible in the depth image; no '
                               'detection; waiting for the next image')
             return None
+        if floor is not None and self._detector.floor is not floor:
+            self._events.warn('floors contradicted', 'tf gives %s, and the depth image shows %s; the latter is used; '
+                              'check the camera mount and ~floor_height'
+                              % tuple(_described(camera_pose_above([used])) for used in (floor, self._detector.floor)))
         self._events.count('images processed')
         return detections._replace(boxes=frame.received_rects(detections.boxes))
+
+
+def _described(pose):
+    return 'a camera %.2f m above the floor, tilted by %.1f and rolled by %.1f degrees' % (
+        pose.height_m, math.degrees(pose.tilt_rad), math.degrees(pose.roll_rad))

@@ -9,14 +9,14 @@ from typing import NamedTuple, Tuple
 import numpy as np
 
 from ros_3d_bb.detection.boxes import Detections
-from ros_3d_bb.detection.depth.ground_plane import FittedFloor, check_upright
-from ros_3d_bb.detection.depth.person_classifier import (BEST_HOG, PersonHog, PersonWindow, person_score, pyramid_of,
-                                                         shape_features_of)
+from ros_3d_bb.detection.depth.ground_plane import FAR_M, FittedFloor, KnownFloor, check_upright, is_confirmed
+from ros_3d_bb.detection.depth.person_classifier import (BEST_HOG, LOW_SCORE, PersonHog, PersonWindow, Pyramid,
+                                                         person_score, shape_features_of)
 from ros_3d_bb.detection.depth.person_clusters import (DepthPeopleParams, find_person_clusters, grid_of, is_human,
                                                        is_standing, quantile_of)
 
 MEAN_HEIGHT_M, MEAN_WIDTH_M = 1.7, 0.5  # assumed for people who are partly outside the image
-SURE_SCORE = 0.95  # no further HOG scores are evaluated from this score on
+SURE_SCORE = 0.9  # no further HOG scores are evaluated from this score on
 MAX_HOG_AGE = 2  # number of further images for which the HOG score of a person is used
 # Hysteresis, as of the thresholds of Canny (1986): a person who was sure in so many images continues with a lower
 # score, as one who crouches or is partly hidden, for a number of images. An image without the person counts as several
@@ -27,6 +27,7 @@ LEAST_SURE, CONTINUED_SCORE, MAX_UNSURE, NOT_FOUND = 3, 0.1, 75, 15
 # ones score 0.03 or more, walls and cupboards 0.01.
 LEGS_SCORE = 0.02
 NEARER_M, HIDDEN_SHARE = 0.3, 0.5  # of a person who hides the legs of another one, and of the width of these; chosen
+FLOOR_STEP = 3  # every n-th cell of the grid confirms the floor
 MIN_DISTANCE_M = 0.35  # between the centres of two people; closer detections are one person
 
 
@@ -55,7 +56,7 @@ class DepthPeople(object):
 
     def __init__(self, params=DepthPeopleParams()):
         self.reconfigure(params)
-        self._hog, self._fitted_floor = PersonHog(), FittedFloor()
+        self._hog, self._fitted_floor, self._known_floor = PersonHog(), FittedFloor(), KnownFloor()
         self._last_people = []  # DepthDetections in the last image, and those lost since
 
     def reconfigure(self, params):
@@ -83,12 +84,11 @@ class DepthPeople(object):
         if floor is not None:
             self._fitted_floor = FittedFloor()
         else:
-            floor = self._fitted_floor.update(depth, camera, self._params)
-        if floor is None:
+            self._known_floor = KnownFloor()
+        grid = self._grid_of(depth, camera, floor)
+        if grid is None:
             return None
-        check_upright(floor)
-        grid = grid_of(depth, camera, floor, self._params)
-        pyramid = pyramid_of(image)
+        floor, pyramid = self.floor, Pyramid(image)
         people = []
         for blob, shape in find_person_clusters(grid, camera, self._params):
             box = box_of(blob, shape, grid, camera, floor)
@@ -97,7 +97,7 @@ class DepthPeople(object):
             may_continue = last is not None and last.sure >= LEAST_SURE and last.unsure < MAX_UNSURE
             if not stands and not may_continue:
                 continue
-            features = shape_features_of(blob.mask, blob.window(grid.ahead_m), shape.thickness_m)
+            features = shape_features_of(blob, shape, grid)
             if person_score(features, BEST_HOG, shape.cut_top) < self._params.min_score:
                 continue  # rejected by its shape alone: HOG cannot raise the score enough
             window = person_window_of(blob, shape, grid, camera, floor)
@@ -117,6 +117,22 @@ class DepthPeople(object):
         self._last_people = people + self._lost(people)
         return _merged_detections([_completed(person, people, camera, floor) for person in people])
 
+    def _grid_of(self, depth, camera, known):
+        """Grid of the image, and its Floor as `self.floor`; None if no floor is known."""
+        if known is None:
+            self.floor = self._fitted_floor.update(depth, camera, self._params)
+            return None if self.floor is None else grid_of(depth, camera, self.floor, self._params)
+        check_upright(known)
+        self.floor = self._known_floor.of(known)
+        grid = grid_of(depth, camera, self.floor, self._params)
+        depth_m, height_m = (values[::FLOOR_STEP, ::FLOOR_STEP] for values in (grid.depth_m, grid.height_m))
+        valid = (depth_m > 0) & (depth_m < FAR_M)
+        if not is_confirmed(height_m[valid], depth_m[valid], self.floor):
+            last, self.floor = self.floor, self._known_floor.correct(known, depth, camera, self._params)
+            if self.floor is not last:
+                grid = grid_of(depth, camera, self.floor, self._params)
+        return grid
+
     def _last_at(self, position_m):
         """The DepthDetection of the last people at a position; None without one."""
         return next((person for person in self._last_people
@@ -133,7 +149,10 @@ class DepthPeople(object):
         return lost
 
     def _hog_scores(self, pyramid, window, last):
-        """Yield HOG scores and their ages: that of the person in the last image, if any, then new ones."""
+        """Yield HOG scores and their ages: the lowest one, which a sure shape does not need to be raised, that of the
+        person in the last image, if any, then new ones.
+        """
+        yield LOW_SCORE, MAX_HOG_AGE
         if last is not None and last.hog_age < MAX_HOG_AGE:
             yield last.hog, last.hog_age + 1
         for hog in self._hog.scores(pyramid, window):

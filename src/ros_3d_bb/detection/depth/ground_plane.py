@@ -16,12 +16,16 @@ BELOW_WEIGHT = 10  # points below a plane count this much against it: a table ma
 FAR_M = 8.0
 MAX_ROLL_RAD = MAX_UPWARDS_RAD = np.radians(27)  # of a camera whose floor is fitted
 MAX_KNOWN_TILT_RAD = np.radians(65)  # of a floor that is known from tf
+ON_PLANE = 0.4  # of the tolerance, after the plane is refined
 MIN_POINTS, MIN_SHARE = 60, 0.04  # inliers of a credible plane: number, and share of the points with depth
 MAX_ABOVE = 0.5  # maximum number of points just above a credible plane per inlier; 1 for one that cuts other surfaces
 MAX_BELOW = 0.05  # maximum share of the points below a credible plane
 MAX_LEVERAGE = 14  # maximum distance of the visible floor from the camera, in standard deviations of its points
 PARALLEL, HIGHER_M = np.cos(np.radians(3)), 0.1  # a table: parallel to the floor, and higher by at least this
 MAX_HIGHER = 100  # images in a row with a higher plane only, after which the camera must have been lowered
+MORE_POINTS = 1.2  # on a fitted plane than on the floor from tf, if it is to replace it; chosen
+MAX_STEP_M = 0.3  # of a fitted plane above the floor from tf; chosen: seats and tables are higher
+CONFIRMED, MIN_CONFIRMING = 0.6, 20  # least share and number of the points near a floor on it, not to fit a plane
 
 # The same random numbers serve for all images: the points of the sample, as shares of their number, and triples.
 _RANDOM = np.random.RandomState(0)
@@ -103,6 +107,53 @@ class FittedFloor(object):
                 and plane.offset_m < self.floor.offset_m - HIGHER_M)
 
 
+class KnownFloor(object):
+    """The floor from tf in successive images, corrected where the depth images contradict it.
+
+    tf may be wrong by the mount, or by the suspension of a robot that brakes. A fitted plane with more points on it
+    replaces the floor from tf, unless it is higher, as a table. The correction holds until an image refutes it.
+    """
+
+    def __init__(self):
+        self._turn, self._rise_m = np.zeros(3), 0.0
+
+    def of(self, known):
+        """The corrected Floor, given the one from tf: `known` itself, unless an image contradicted it."""
+        if not self._turn.any() and not self._rise_m:
+            return known
+        normal = known.normal + self._turn
+        return Floor(normal / np.linalg.norm(normal), known.offset_m + self._rise_m)
+
+    def correct(self, known, depth, camera, params):
+        """Compare the floor from tf with a depth image, after `is_confirmed` failed. Returns the corrected Floor."""
+        points, cells = _points(depth, camera)
+        fitted = _fit(points, cells, params)
+        if fitted is not None and not _is_seat(fitted, known, points):
+            is_better = _support(fitted, points) > MORE_POINTS * _support(known, points)
+            self._turn, self._rise_m = ((fitted.normal - known.normal, fitted.offset_m - known.offset_m) if is_better
+                                        else (np.zeros(3), 0.0))
+        return self.of(known)
+
+
+def is_confirmed(height_m, depth_m, floor):
+    """Whether the points (n,) near a Floor, of which the heights above it and the depths are known, are on it."""
+    heights = np.abs(height_m) / _tolerance_m(depth_m, floor.offset_m)
+    on_plane = np.count_nonzero(heights < ON_PLANE)
+    return on_plane > MIN_CONFIRMING and on_plane > CONFIRMED * np.count_nonzero(heights < 2.5)
+
+
+def _support(floor, points):
+    """Number of the points on a plane, less those below it."""
+    heights = floor.height(points) / _tolerance_m(points[:, 2], floor.offset_m)
+    return np.count_nonzero(np.abs(heights) < ON_PLANE) - BELOW_WEIGHT * np.count_nonzero(heights < -2)
+
+
+def _is_seat(plane, floor, points):
+    """Whether a plane is so high above the floor from tf that it is a seat or a table."""
+    on_plane = points[np.abs(plane.height(points)) < ON_PLANE * _tolerance_m(points[:, 2], plane.offset_m)]
+    return floor.height(on_plane.mean(axis=0)) > MAX_STEP_M
+
+
 def fit_floor(depth, camera, params=DepthPeopleParams()):
     """Fit the floor to a depth image by RANSAC and least squares on the inliers.
 
@@ -121,7 +172,10 @@ def fit_floor(depth, camera, params=DepthPeopleParams()):
     Floor or None
         None if no credible floor is visible.
     """
-    points, cells = _points(depth, camera)
+    return _fit(*_points(depth, camera), params)
+
+
+def _fit(points, cells, params):
     if len(points) < MIN_POINTS:
         return None
     normals, offsets = _hypotheses(points, cells, params)
@@ -130,7 +184,7 @@ def fit_floor(depth, camera, params=DepthPeopleParams()):
 
     sample = points[(SAMPLE * len(points)).astype(int)]
     heights_m = normals.dot(sample.T) + offsets[:, None]
-    heights = heights_m / _tolerance_m(sample, offsets[:, None])
+    heights = heights_m / _tolerance_m(sample[:, 2], offsets[:, None])
     inliers = np.count_nonzero(np.abs(heights) < 1, axis=1)
     best = (inliers - BELOW_WEIGHT * np.count_nonzero(heights < -2, axis=1)).argmax()
     return _refine(Floor(normals[best], offsets[best]), points, params)
@@ -174,15 +228,15 @@ def _is_upright(normals, offsets, params):
             & (offsets > params.min_camera_height) & (offsets < params.max_camera_height))
 
 
-def _tolerance_m(points, offset_m):
+def _tolerance_m(depth_m, offset_m):
     """Maximum distance of inliers from a plane. Errors of heights grow with depth and with the height of the camera."""
-    return np.sqrt(np.maximum(1, offset_m)) * (0.015 + 0.01 * points[:, 2])
+    return np.sqrt(np.maximum(1, offset_m)) * (0.015 + 0.01 * depth_m)
 
 
 def _refine(floor, points, params):
     """Fit the plane to its inliers by least squares. Returns None if the result is not credible."""
-    tolerance_m = _tolerance_m(points, floor.offset_m)
-    for share in (1.0, 0.6, 0.4, 0.4):  # shrink the tolerance: the foot of a wall pulls the plane up
+    tolerance_m = _tolerance_m(points[:, 2], floor.offset_m)
+    for share in (1.0, 0.6, ON_PLANE, ON_PLANE):  # shrink the tolerance: the foot of a wall pulls the plane up
         near = points[np.abs(floor.height(points)) < share * tolerance_m]
         if len(near) < max(MIN_POINTS, MIN_SHARE * len(points)):
             return None

@@ -4,12 +4,13 @@ Convention: clusters are found on a subsampled grid of the depth image. The cell
 [step * row, step * (row + 1)) and the pixel columns [step * column, step * (column + 1)).
 """
 import functools
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 
 from ros_3d_bb.core.params import Param, parameters
+from ros_3d_bb.detection.depth.walls import NOISE, is_wall
 
 CELL_RAD = 0.0065  # of the grid of depth pixels that are used: 4 pixels of a RealSense at 640x480
 FLOOR_M, CEILING_M = 0.12, 2.15  # what is lower above the floor is floor, what is higher is ceiling
@@ -21,6 +22,8 @@ MAX_TOP_M, MAX_BOTTOM_M = 2.1, 0.8  # above the floor: of the head, and of the l
 MIN_VISIBLE_M = 0.9  # height of the visible part of a standing person whose head is in the image
 MIN_CELLS = 20  # smaller clusters are ignored; a person 6 m away has about 300 cells
 HEADROOM_M = 0.15  # minimum depth of the valley between the heads of two people side by side
+BORDER_M = 0.15  # of a body, that may be below it in the image and not belong to the blob
+SIDE_M = 0.2  # of the legs beside the trunk
 HIP_M = 0.95  # lower peaks do not count: in an image cut above the hips, the legs of one person form a valley, too
 # Smallest height of the top and of the visible part of a person who crouches or bends, the latter also where the image
 # ends below the head; chosen.
@@ -59,7 +62,9 @@ class Grid(NamedTuple):
     depth_m: np.ndarray  # 0 where it is unknown
     height_m: np.ndarray  # above the floor
     ahead_m: np.ndarray  # along the floor: constant over an upright surface, even if the camera is tilted
+    rays: Any  # to the right, ahead and up, along and above the floor, at a depth of 1 m
     step: int
+    ends: Any  # first and last column with depth (2,), and of each column the first and last row with depth
 
 
 class Blob(NamedTuple):
@@ -83,6 +88,7 @@ class Shape(NamedTuple):
     """Size of a blob, heights above the floor, and the image borders that cut it."""
 
     depth_m: float
+    cell_m: float  # width of a cell at this depth
     width_m: float
     thickness_m: float
     bottom_m: float
@@ -102,8 +108,17 @@ def grid_of(depth, camera, floor, params):
     x, y = _rays(camera, step)
     ahead = np.array([0, 0, 1]) - floor.normal[2] * floor.normal
     ahead /= np.linalg.norm(ahead)
-    up_per_m, ahead_per_m = (np.float32(axis[0] * x + axis[1] * y + axis[2]) for axis in (floor.normal, ahead))
-    return Grid(depth_m, depth_m * up_per_m + np.float32(floor.offset_m), depth_m * ahead_per_m, step)
+    rays = np.stack([np.float32(axis[0] * x + axis[1] * y + axis[2])
+                     for axis in (np.cross(ahead, floor.normal), ahead, floor.normal)])
+    return Grid(depth_m, depth_m * rays[2] + np.float32(floor.offset_m), depth_m * rays[1], rays, step,
+                _ends(depth_m > 0))
+
+
+def _ends(valid):
+    """First and last column of a grid with depth, and of each column the first and last row with depth."""
+    columns = np.flatnonzero(valid.any(axis=0))
+    sides = columns[[0, -1]] if len(columns) else (0, 0)
+    return sides, valid.argmax(axis=0), len(valid) - 1 - valid[::-1].argmax(axis=0)
 
 
 @functools.lru_cache(maxsize=8)  # undistortion takes longer than the rest
@@ -115,21 +130,30 @@ def _rays(camera, step):
 def find_person_clusters(grid, camera, params):
     """Return (Blob, Shape) of each blob of human size, of people who crouch, too, and of parts of people."""
     clusters = _merge_stacked(_split_blobs(grid, camera, params), grid, camera)
-    return [(blob, shape) for blob, shape in clusters if is_human(shape) or _is_part(shape)]
+    return [(blob, shape) for blob, shape in clusters
+            if shape.depth_m < params.max_depth and (is_human(shape) or _is_part(shape))]
+
+
+def max_step(depth_m):
+    """Largest difference of depth, metres, between neighbouring cells of one surface."""
+    return STEP_M + STEP_GROWTH_PER_M * depth_m ** 2
 
 
 def _foreground_cells(grid, params):
-    """Cells between floor and ceiling that no depth step crosses, (rows, columns) bool.
+    """Cells between floor and ceiling, off the walls, that no depth step crosses, (rows, columns) bool.
+
+    They reach as much beyond `max_depth` as the noise of the farthest person, who would otherwise be in pieces.
 
     Of two cells at a depth step the farther one is removed. This separates the surfaces and keeps the outline of the
     nearer one. The threshold grows with the square of depth, like the error of stereo.
     """
     depth_m = grid.depth_m
-    cells = (depth_m > 0) & (depth_m < params.max_depth)
-    cells &= (grid.height_m > FLOOR_M) & (grid.height_m < CEILING_M)
+    cells = (depth_m > 0) & (grid.height_m > FLOOR_M)
+    cells[cells] = ~is_wall(grid.rays[:, cells], depth_m[cells], grid.height_m[cells])
+    cells &= (depth_m < params.max_depth + NOISE * params.max_depth ** 2) & (grid.height_m < CEILING_M)
     for after, before in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):
         change_m = depth_m[after] - depth_m[before]
-        max_step_m = STEP_M + STEP_GROWTH_PER_M * np.minimum(depth_m[after], depth_m[before]) ** 2
+        max_step_m = max_step(np.minimum(depth_m[after], depth_m[before]))
         cells[after] &= change_m <= max_step_m
         cells[before] &= change_m >= -max_step_m
     return cells
@@ -141,10 +165,28 @@ def shape_of(blob, grid, camera):
     depth_m, ahead_m, height_m = (np.sort(blob.of(values)) for values in (grid.depth_m, grid.ahead_m, grid.height_m))
     last = depth_m.size - 1
     middle = float(depth_m[last // 2])
-    return Shape(middle, columns * grid.step * middle / camera.fx, ahead_m[last - last // 20] - ahead_m[last // 20],
-                 height_m[last // 100], height_m[last - last // 100], blob.row <= 1,
-                 blob.row + rows >= grid.depth_m.shape[0] - 1,
-                 blob.column == 0 or blob.column + columns >= grid.depth_m.shape[1])
+    rays = grid.rays[0][blob.row + rows // 2, blob.column:blob.column + columns]
+    cell_m = middle * float(rays[-1] - rays[0]) / (columns - 1) if columns > 1 else grid.step * middle / camera.fx
+    return Shape(middle, cell_m, columns * cell_m, ahead_m[last - last // 20] - ahead_m[last // 20],
+                 height_m[last // 100], height_m[last - last // 100], *_cuts(blob, grid, camera, middle))
+
+
+def _cuts(blob, grid, camera, depth_m):
+    """Whether the upper, lower, and a lateral end of a blob is no end of the body.
+
+    No depth is measured beyond such an end up to the border of the image, or the lower one is hidden by something
+    nearer.
+    """
+    rows, columns = blob.mask.shape
+    (left, right), first, last = grid.ends
+    here, end = slice(blob.column, blob.column + columns), blob.row + rows
+    margin = BORDER_M * camera.fy / (grid.step * depth_m)
+    top, bottom = blob.mask[:3].any(axis=0), blob.mask[-3:].any(axis=0)
+    below_m = grid.depth_m[end:end + 3, here][:, bottom]
+    nearer = ((below_m > 0) & (below_m < depth_m - max_step(depth_m))).any(axis=0)
+    return (np.mean(first[here][top] >= blob.row - 1) > 0.5,
+            np.mean((last[here][bottom] <= end + margin) | nearer) > 0.5,
+            blob.column <= left + 1 or blob.column + columns >= right)
 
 
 def quantile_of(values, share):
@@ -168,7 +210,7 @@ def is_human(shape):
 
 def is_standing(shape, params):
     """Whether a blob has the size of a standing person."""
-    is_high = shape.top_m >= params.min_top and shape.top_m - shape.bottom_m >= MIN_VISIBLE_M
+    is_high = shape.top_m >= params.min_top and (shape.cut_bottom or shape.top_m - shape.bottom_m >= MIN_VISIBLE_M)
     return is_human(shape) and (shape.cut_top or is_high)
 
 
@@ -181,13 +223,28 @@ def _connected(cells, row=0, column=0):
             yield Blob(row + y, column + x, labels[y:y + height, x:x + width] == label)
 
 
+def _may_be_part(blob, grid, camera):
+    """Whether a blob has half of the area of the smallest part of a person, at the depth of one of its cells, or the
+    image border cuts it.
+    """
+    (rows, columns), (height, width) = blob.mask.shape, grid.depth_m.shape
+    if min(blob.row, blob.column) == 0 or blob.row + rows == height or blob.column + columns == width:
+        return True
+    depth_m = grid.depth_m[blob.row, blob.column + blob.mask[0].argmax()]
+    area_m2 = np.count_nonzero(blob.mask) * (grid.step * depth_m / camera.fx) ** 2
+    return area_m2 > PART_WIDTH_M * PART_VISIBLE_M / 2
+
+
 def _split_blobs(grid, camera, params):
     """Foreground blobs and their shapes; blobs that have two heads or are too large for one person are split."""
-    to_split = [(blob, 0) for blob in _connected(_foreground_cells(grid, params))]
+    to_split = [(blob, 0) for blob in _connected(_foreground_cells(grid, params)) if _may_be_part(blob, grid, camera)]
     parts = []
     while to_split:
         blob, splits = to_split.pop()
         shape = shape_of(blob, grid, camera)
+        trunk = _without_sides(blob, grid, shape)
+        if trunk is not blob:
+            blob, shape = trunk, shape_of(trunk, grid, camera)
         too_large = shape.width_m > MAX_WIDTH_M or shape.thickness_m > MAX_THICKNESS_M
         pieces = _split_between_heads(blob, grid) if shape.width_m > 2 * MIN_WIDTH_M else []
         if too_large and not pieces:
@@ -197,6 +254,20 @@ def _split_blobs(grid, camera, params):
         elif not too_large:
             parts.append((blob, shape))
     return parts
+
+
+def _without_sides(blob, grid, shape):
+    """A blob without what is beside the trunk and lower than the hips, such as a chair beside a person."""
+    outline = np.where(blob.mask, blob.window(grid.height_m), 0).max(axis=0)
+    trunk = np.flatnonzero(outline > HIP_M)
+    if not len(trunk):
+        return blob
+    margin = int(SIDE_M / shape.cell_m) + 1
+    left, right = max(trunk[0] - margin, 0), trunk[-1] + margin + 1
+    if left == 0 and right >= blob.mask.shape[1]:
+        return blob
+    pieces = list(_connected(blob.mask[:, left:right], blob.row, blob.column + left))
+    return max(pieces, key=lambda piece: np.count_nonzero(piece.mask), default=blob)
 
 
 def _split_in_depth(blob, grid):
@@ -252,7 +323,7 @@ def _are_stacked(blob, shape, other, other_shape):
     columns = _overlap(blob.column, blob.mask.shape[1], other.column, other.mask.shape[1])
     rows = _overlap(blob.row, blob.mask.shape[0], other.row, other.mask.shape[0])
     step_m = 0.2 + 2 * STEP_GROWTH_PER_M * shape.depth_m ** 2
-    return (columns > 0.5 and rows < 0.3 and abs(shape.depth_m - other_shape.depth_m) < step_m
+    return (columns > 0.5 and rows < 0.6 and abs(shape.depth_m - other_shape.depth_m) < step_m
             and max(shape.top_m, other_shape.top_m) < MAX_TOP_M)
 
 
