@@ -114,10 +114,10 @@ def test_a_person_behind_something_in_the_depth_image_is_occluded(rig):
 
 
 @pytest.mark.parametrize('columns,cx,expected', [
-    ((205, 235), 212, [OCCLUDED]), ((175, 205), 212, []), ((0, 0), 500, [OUT_OF_VIEW])])
+    ((205, 235), 212, [OCCLUDED]), ((175, 205), 212, []), ((0, 0), 423, [OUT_OF_VIEW])])
 def test_raw_depth_is_compared_from_where_its_camera_stands(monkeypatch, columns, cx, expected):
     """It stands 0.1 m to the left of the colour camera, and sees something in these columns, 1.5 m ahead. With a
-    principal point beside its image, it does not see the person."""
+    principal point at the border of its image, it does not see the person."""
     rig, beside = Rig(depth='raw'), transform_from((-0.1, 0, 0), (0, 0, 0, 1))
     lookup = rig.transforms.lookup
     monkeypatch.setattr(rig.transforms, 'lookup', lambda target, source, stamp: (
