@@ -52,7 +52,7 @@ def is_wall(rays, depth_m, height_m):
 
 def find_walls(rays, inverse):
     """Walls through a sample of points, from their rays (3, n) and inverse depths (n,), by RANSAC; a list of Wall."""
-    walls, everything = [], (rays, inverse)
+    walls, everything = [], (rays, inverse)  # also of other walls, which may be behind
     for pairs in PAIRS:
         if len(inverse) < MIN_POINTS:
             break
@@ -62,7 +62,7 @@ def find_walls(rays, inverse):
         if np.count_nonzero(on) < MIN_POINTS:
             break
         gradient, refined = _refined(rays, inverse, on)
-        wall = Wall(gradient, _filled(gradient, *everything))
+        wall = Wall(gradient, _filled(gradient, rays, inverse, everything))
         if wall.filled.any():
             walls.append(wall)
         rays, inverse = rays[:, ~(on | refined)], inverse[~(on | refined)]
@@ -106,14 +106,20 @@ def _bins(gradient, rays, predicted):
     return (across / predicted + BINS // 2).clip(0, BINS - 1).astype(int)
 
 
-def _filled(gradient, rays, inverse):
-    """Which bins along a plane are a wall: long rows of bins with points, behind which little is visible."""
+def _counts(gradient, rays, inverse):
+    """Numbers of points on, behind and before each bin along a plane, 3 x (BINS,)."""
     predicted = gradient.dot(rays)
     ahead = predicted > LEAST
     before, tolerance = (inverse - predicted)[ahead], _tolerance(gradient[None], inverse[ahead])[0]
     bins = _bins(gradient, rays[:, ahead], predicted[ahead])
-    on, behind, nearer = (np.bincount(bins[chosen], minlength=BINS) for chosen in (
-        np.abs(before) < tolerance, before < -2 * tolerance, before > tolerance))
+    return [np.bincount(bins[chosen], minlength=BINS)
+            for chosen in (np.abs(before) < tolerance, before < -2 * tolerance, before > tolerance)]
+
+
+def _filled(gradient, rays, inverse, everything):
+    """Which bins along a plane are a wall: long rows of bins with points, behind which little is visible."""
+    on = _counts(gradient, rays, inverse)[0]
+    _on, behind, nearer = _counts(gradient, *everything)
     filled = (on > 0) & (behind <= SEEN_THROUGH * on)
     for start, end in _runs(~filled):
         is_hidden = end - start <= SMALL_GAP or end - start <= MAX_GAP and nearer[start:end].any()
