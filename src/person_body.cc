@@ -14,7 +14,7 @@ class PersonBody : public gazebo::ModelPlugin
       return;
     }
     body->Init();
-    body->SetKinematic(true);  // moves as it is told, and pushes what it touches
+    body->SetKinematic(true);  // follows the commanded motion, and pushes what it touches
   }
 };
 

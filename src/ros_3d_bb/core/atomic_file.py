@@ -37,7 +37,7 @@ def replacement_of(path, prefix='.', suffix='.tmp'):
 
 
 def check_writable(path):
-    """Raise OSError if a file cannot be written to `path`. For commands that work long before they write it."""
+    """Raise OSError if a file cannot be written to `path`. For commands that run long before they write."""
     os.unlink(_new_file_beside(path, '.', '.tmp'))
 
 

@@ -15,7 +15,7 @@ BUSY_SHARE = 0.75
 FREE_SHARE = 0.6  # share of the period that a larger size may take, as estimated from its number of pixels; chosen
 FASTER_SHARE = 0.9  # share of fewer periods that a detection may take before it is done in more images; chosen
 PATIENCE, MAX_PATIENCE = 4, 512  # windows of images in a row with enough time before work is increased; chosen
-SOON = 30  # windows of images; an increase that is undone within them was none; chosen
+SOON = 30  # windows of images; an increase that is undone within them did not pay; chosen
 PERSON_M = 1.7  # height of a person
 # Height of a person in the input from which on YOLOv5n finds 9 of 10 people of the thesis; it finds no more of them at
 # 8 m in larger inputs. At 65 to 70 pixels 8, at 53 pixels 4. Measured:
@@ -36,9 +36,9 @@ class DetectionPace(object):
     """Chooses the largest size with which a detection takes less time than the period of the images.
 
     If the smallest size takes longer, detections take place in every n-th image, at a steady rate. An image with a
-    detection has just arrived, while it waits for half a period on average if each detection begins when the last one
-    ends. Therefore the newest result is not older on average, although detections are fewer: for a duration of d
-    periods its age is d + n / 2 instead of d + 1 / 2 + d / 2, and n < d + 1.
+    detection has just arrived. If each detection began when the last one ends, the image would have waited for half a
+    period on average. Therefore the newest result is not older on average, although detections are fewer: for a
+    duration of d periods its age is d + n / 2 instead of d + 1 / 2 + d / 2, and n < d + 1.
 
     Work is reduced after one window of detections that are too slow, and increased after several in which there was
     enough time. Each time that an increase is soon undone, the next one has to wait for twice as many windows, so that
@@ -60,7 +60,7 @@ class DetectionPace(object):
         self._detected_ns = None  # stamp of the newest image for detection
 
     def use_sizes(self, sizes):
-        """Choose from other sizes. The current one is kept if it is among them; else the largest one is tried."""
+        """Choose from other sizes. The current one is kept if it is among them; otherwise the largest one is tried."""
         with self._lock:
             if tuple(sizes) != self._sizes:
                 self._sizes = tuple(sizes)
@@ -101,7 +101,7 @@ class DetectionPace(object):
             return True
 
     def _adapt_patience(self):
-        """Wait longer for the next increase if the last one is undone soon, or no longer than at first."""
+        """Double the patience if the last increase is undone soon; otherwise reset it."""
         if self._windows_since_increase is not None:
             was_soon = self._windows_since_increase <= SOON
             self._patience = min(2 * self._patience, MAX_PATIENCE) if was_soon else PATIENCE

@@ -4,8 +4,8 @@
 class Senders(object):
     """Nodes that send messages on a topic, or transforms of a frame.
 
-    Several send at once if one of them sends again after another. A node that was restarted under another name, as the
-    player of a bag, only follows the former one.
+    Several nodes send at once if one of them sends again after another one. A node that was restarted under another
+    name, such as the player of a bag, only follows the former one.
     """
 
     def __init__(self):
@@ -19,7 +19,7 @@ class Senders(object):
             self._latest = node
 
     def take(self):
-        """Names of the nodes that have sent at once since the last call; empty if there was one at a time."""
+        """Names of the nodes that have sent at once since the last call; empty if only one sent at a time."""
         found = tuple(sorted(self._nodes)) if self._alternate else ()
         self._nodes, self._alternate = {self._latest}, False
         return found

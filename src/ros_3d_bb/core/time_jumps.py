@@ -7,7 +7,7 @@ SETTLING_S = 1.0  # chosen: longer than the pipeline takes from image to tracks
 
 
 class TimeJumps(object):
-    """Notices jumps of clocks: of ROS time, and of the stamps of a topic, either of which may be the first to jump.
+    """Detects jumps of clocks: of ROS time and of the stamps of a topic, either of which may jump first.
 
     A clock jumps if it goes back by more than `JUMP_NS`, or ahead by so much more than the clock of the machine. For
     `SETTLING_S` after a jump, while `are_recent`, stamps and ROS time may disagree although each is right.

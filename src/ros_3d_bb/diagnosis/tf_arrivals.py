@@ -1,4 +1,4 @@
-"""Arrival of transforms: whether they are of the time of the images, and in time for them."""
+"""Arrival of transforms: whether their stamps agree with those of the images, and whether they arrive in time."""
 import collections
 
 import numpy as np

@@ -177,11 +177,11 @@ def clock_fault_of_tf(tf, images_lag_s, timeout_s):
     late, ahead = max(tf.lags_s, key=tf.lags_s.get), min(tf.lags_s, key=tf.lags_s.get)
     fix = 'synchronise the clocks of all machines and of the camera (chrony, settings of the driver)'
     if tf.lags_s[ahead] < -EARLY_S:
-        return ('the stamps of the transforms from %s to %s are %.1f s after the time of their arrival: the pose at '
-                'the stamp of an image is an earlier one' % (ahead, tf.links[ahead].parent, -tf.lags_s[ahead]), fix)
+        return ('the stamps of the transforms from %s to %s are %.1f s after the time of their arrival: at the stamp '
+                'of an image, tf has an earlier pose' % (ahead, tf.links[ahead].parent, -tf.lags_s[ahead]), fix)
     behind_s = tf.lags_s[late] - (images_lag_s or 0.0)
     if tf.in_time is None or tf.in_time >= MIN_IN_TIME or behind_s <= timeout_s:
         return '', ''
     return ('the stamps of the transforms from %s to %s are %.1f s before those of images that arrive at the same '
-            'time, which wait %g s for them (tf_timeout)' % (late, tf.links[late].parent, behind_s, timeout_s),
-            fix + ', or is the publisher of %s that late?' % late)
+            'time; images wait %g s for a transform (tf_timeout)' % (late, tf.links[late].parent, behind_s, timeout_s),
+            fix + ', or reduce the delay of the publisher of %s' % late)

@@ -79,7 +79,7 @@ def graph_findings(arguments):
         if shutdown.wait(arguments.seconds):
             raise KeyboardInterrupt
         seen = observer.observations()
-        found = _namespace_findings(seen.nodes) or findings(seen)  # those of another namespace would mislead
+        found = _namespace_findings(seen.nodes) or findings(seen)  # findings of another namespace would mislead
         observer.close()
         if len(cameras) > 1:
             found.insert(0, Finding('cameras', '%s; of %s, checked one at a time: doctor --camera NAME'

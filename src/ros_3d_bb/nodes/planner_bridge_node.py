@@ -87,8 +87,8 @@ class PlannerTopic(object):
         try:
             message = output.write(tracks, received.transforms[output.frame, output.latest_tf], header)
         except Exception as error:  # a fault of one output must not keep the tracks from the others
-            self._diagnostics.warn('outputs failed', '%s cannot be written (%r); the others are published, and it '
-                                   'is tried again with the next tracks' % (output.topic, error))
+            self._diagnostics.warn('outputs failed', '%s cannot be computed (%r); the other outputs are published, '
+                                   'and this one is tried again with the next tracks' % (output.topic, error))
             return
         self._publisher.publish(message)
 

@@ -125,7 +125,7 @@ class RgbdSource(object):
             floor_frame, camera_from_floor = upright_transform(self._transforms, wanted, frame_id)
         except tf2_ros.TransformException as error:
             self._note_once(TILT_UNKNOWN, 'the tilt of the camera is unknown, as there is no transform from %s to %s: '
-                            '%s; positions are estimated as if it were level, and the detector depth fits the floor to '
+                            '%s; positions are those of a level camera, and the detector depth fits the floor to '
                             'the depth image; set ~floor_frame to a frame of tf whose z axis points up, such as map'
                             % (wanted, frame_id, error))
             return None, False

@@ -49,7 +49,7 @@ class TrackerNodeParams(NamedTuple):
     tracking_frame: str = Param(
         AUTO, 'Frame in which people are tracked. In target_frame, people seem to jump with each correction of the '
         'localisation; in an odometry frame, they do not (REP 105). auto: the frame whose name begins with odom, such '
-        'as odom or robot1/odom, if tf has it between the camera and target_frame, else target_frame.')
+        'as odom or robot1/odom, if it is between the camera and target_frame in tf; otherwise target_frame.')
     error_model: str = Param('')
     cameras: list = Param(())
     camera_frame: str = Param('')
@@ -66,8 +66,8 @@ class TrackerNodeParams(NamedTuple):
         'cameras are published, and planners drive on as if the silent one saw no people.', 's')
     ignored_areas: NestedList = Param(
         '', 'Polygons of target_frame in which no track starts, as around mirrors and posters: a list of lists of '
-        'corners, such as [[[1, 2], [3, 2], [3, 4]]]; empty: none. Tracked people can walk through. Tracks in an area '
-        'end when it is set.', 'm', live=True, section=PLACES)
+        'corners, such as [[[1, 2], [3, 2], [3, 4]]]; empty: none. People who walk into an area stay tracked. Tracks '
+        'in an area end when it is set.', 'm', live=True, section=PLACES)
     map_depth: float = Param(
         0.3, 'With a map, no track starts in occupied cells and up to this distance behind them, as seen by the '
         'camera.', 'm', limits=(0, 2), live=(0, 1), section=PLACES)
@@ -264,8 +264,8 @@ class TrackingStage(object):
         recent_ns.append(stamp_ns)
         period_ns = median_period_ns(list(recent_ns))
         if len(recent_ns) == RECENT and (1 + JITTER) * period_ns > LONGEST_NS and TOO_SLOW not in self._events.counts:
-            self._events.warn(TOO_SLOW, '3D boxes arrive every %.2f s; people are tracked if it is less than %g s: '
-                              'choose a faster detector' % (period_ns / NS, LONGEST_NS / NS))
+            self._events.warn(TOO_SLOW, '3D boxes arrive every %.2f s; less than %g s expected, or walking people are '
+                              'not tracked; choose a faster detector' % (period_ns / NS, LONGEST_NS / NS))
 
     def _silent_cameras(self, newest_ns):
         """Names of the cameras whose newest boxes are older than ~camera_timeout."""

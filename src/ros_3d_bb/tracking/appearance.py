@@ -1,4 +1,4 @@
-"""Appearance of tracked people: which track a box belongs to, and who has returned, by the colours of the clothes.
+"""Appearance of tracked people: by the colours of the clothes, the track of a box, and the ID of a person who returns.
 
 The appearance of a box is that of `estimation.appearance`. The evidence that it shows the person of a track is a
 likelihood ratio: colours of one person vary little from image to image, those of different people vary much. A part of
@@ -20,7 +20,7 @@ MOST_ALIKE = 3.0  # bound of the evidence for the association: a wrong colour mu
 MOST_IMAGES = 20  # number of images over which the colours are averaged
 LEAST_SUPPORT = 0.5  # of the boxes whose colours are learned
 LEAST_IMAGES = 3  # that show a part of a person who can be recognised
-RETURN_NS = 300 * NS  # who returns later is a new person: lights and clothes change
+RETURN_NS = 300 * NS  # a person who returns later gets a new ID: lights and clothes change
 RETURN_ODDS = 4.0  # that a new track is the person who has left, and not another one
 RETURN_MPS, RETURN_M = 2.0, 1.0  # people return no faster than this
 MOST_DEPARTED = 50
@@ -119,7 +119,7 @@ class Departed(NamedTuple):
 
 
 def departed_after(departed, deleted, stamp_ns):
-    """The tuple of those who may return, after the tracks `deleted` end."""
+    """The tuple of people who may return, after the tracks `deleted` end."""
     known = [Departed.of(track) for track in deleted if track.is_confirmed and track.appearance is not None
              and track.appearance.is_known]
     if not (departed or known):
@@ -139,8 +139,8 @@ def returned(track, others, departed):
     """The Departed that a new track shows: one of the `departed`, or of the confirmed tracks `others` that has not been
     seen together with it; None if this is not likely enough.
 
-    Those who have been seen together are different people. If they look alike, this is less likely. Candidates who have
-    never been seen together may be the same person.
+    People who were seen together with the best candidate or with the track are different people. If they look alike, a
+    return is less likely. Candidates who were never seen together may be the same person.
     """
     candidates = [Departed.of(other) for other in others if other.appearance is not None] + list(departed)
     ratios = {person.id: person.appearance.ratios(track.appearance.mean)

@@ -80,17 +80,19 @@ class PredictionParams(NamedTuple):
         0.02, 'How much more people turn than the filter models: density of a white acceleration.', 'm^2/s^3',
         live=(0, 1))
     manoeuvre_acceleration: float = Param(
-        0.45, 'The same in addition, of people who start. Those who stop or turn while they walk have a third of it.',
+        0.45, 'Additional density of a white acceleration of people who start. People who stop or turn while they walk '
+        'have a third of it.',
         'm^2/s^3', live=(0, 2))
     standing_speed: float = Param(
         0.15, 'A velocity much lower than this is not extrapolated: it is mostly noise.', 'm/s', live=(0, 1))
     position_bias: float = Param(
         0.05, 'Standard deviation added for errors that stay the same for seconds.', 'm', live=(0, 0.5))
     pose_sigma: float = Param(
-        0.0, 'Standard deviation of the position of the robot in the frame of the tracks, along each axis, as of its '
-        'localisation.', 'm', live=(0, 1))
+        0.0, 'Standard deviation of the position of the robot in the frame of the tracks, along each axis, such as the '
+        'error of its localisation. It is added to the covariances.', 'm', live=(0, 1))
     pose_yaw_sigma: float = Param(
-        0.0, 'Standard deviation of the heading of the robot in the frame of the tracks.', 'rad', live=(0, 0.5))
+        0.0, 'Standard deviation of the heading of the robot in the frame of the tracks. It is added to the '
+        'covariances.', 'rad', live=(0, 0.5))
 
 
 class Rules(NamedTuple):

@@ -71,7 +71,7 @@ class TrackerParams(NamedTuple):
     max_age: float = Param(
         4.0, 'A person who is not detected for longer than this gets a new track ID. So does one who reappears where a '
         'new target is more likely: with the default parameters after 3 s, except for people who stop behind an '
-        'occluder. People whose clothes are recognised keep theirs. With 0, every missed person gets a new ID.',
+        'occluder. People whose clothes are recognised keep their ID. With 0, every missed person gets a new ID.',
         's', live=(0, 30))
     moving_speed: float = Param(
         0.2, 'A person counts as moving from this speed on, and then down to half of it.', 'm/s', live=(0, 1))
@@ -233,7 +233,7 @@ class Tracker(object):
         return cameras
 
     def _delete(self, tracks, stamp_ns):
-        """The tracks that are kept, tentative ones for a short time only; and those that end."""
+        """The tracks that are kept (tentative ones for a short time only), and the tracks that end."""
         max_age_s, kept, deleted, duplicate_ids = self._params[0].max_age, [], [], ()
         if tracks and stamp_ns - max(tracks, key=FIRST_SEEN).first_ns < NEW_NS:
             duplicate_ids = duplicates(tracks, stamp_ns)
@@ -246,8 +246,8 @@ class Tracker(object):
 
 
 def _recognised(track, tracks, departed):
-    """Give a new track the ID of the person who has returned, if there is one. Returns the tracks without the former
-    one of this person, and the departed without this person."""
+    """Give a new track the ID of a person who has returned, if it shows one. Returns the tracks without the former
+    track of this person, and the departed without this person."""
     person = returned(track, [other for other in tracks if other.is_confirmed and other is not track], departed)
     if person is None:
         return tracks, departed

@@ -6,7 +6,7 @@ people of a measurement session are placed side by side in one wide depth image.
 and boxes, and take turns in being first, so that other load on the machine and cold caches affect all equally and their
 ratios remain valid.
 
-The algorithms of the thesis are those of its published code (`--published`), and as one would write them today.
+The algorithms of the thesis are its published code (`--published`) and an optimised reimplementation.
 """
 import functools
 import itertools
@@ -110,7 +110,7 @@ class Ours(object):
 
 
 class Theirs(object):
-    """Algorithms of the thesis in the optimised version that its chapter 3 describes, as one would write them today.
+    """Algorithms of the thesis in the optimised version that its chapter 3 describes, reimplemented.
 
     Boxes are processed one by one, with arrays for the samples of a box (section 3.4.2) instead of the loops of the
     proof of concept, which is 2.5 times slower. Objects are processed one by one, with distances in one array (section

@@ -1,4 +1,4 @@
-"""Walls in the grid of a depth image: upright planes that are longer than people are wide.
+"""Walls in the grid of a depth image: vertical planes that are wider than people.
 
 Convention: `rays` are viewing rays (right, ahead, up) at depth 1 m, relative to the floor. On a plane, inverse depth is
 a linear function of the ray, its `gradient` (3,), and the noise of stereo is uniform in it.

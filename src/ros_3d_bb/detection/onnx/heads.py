@@ -93,7 +93,7 @@ def layout_of(outputs, input_hw, metadata, head='', strides=(), names=()):
                              list(strides), cell_count(input_hw, strides), shapes[0][1], shapes[0][2]))
     if grid and not head and any(len(shape) == 3 and _matches(shape, cell_count(input_hw, grid))
                                  for shape in shapes[1:]):
-        raise ValueError('scores and boxes are separate outputs, %s, which are those of no known head'
+        raise ValueError('scores and boxes are separate outputs, %s, which no known head has'
                          % ' and '.join('%s x %s' % shape[1:] for shape in shapes if len(shape) == 3))
     head = head or _head_of(outputs[0], input_hw, grid, metadata)
     if HEADS[head].strides and not (grid and shapes[0][1] == cell_count(input_hw, grid)):

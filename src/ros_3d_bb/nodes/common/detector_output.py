@@ -95,8 +95,8 @@ class DetectorWorker(object):
     def _keep_pace(self, duration_s):
         if self.pace.add_detection(duration_s):
             size = ' with an input of %d pixels' % self.pace.size if self.pace.size else ''
-            self._diagnostics.note('changes of image size or rate', 'detecting in one of %d images%s from now on, to '
-                                   'keep up with the camera' % (self.pace.interval, size))
+            self._diagnostics.note('changes of image size or rate', 'now detecting in one of %d images%s, to keep '
+                                   'up with the camera' % (self.pace.interval, size))
 
     def _on_error(self, error):
         self._diagnostics.warn('detections failed', 'the detector failed: %s; waiting for the next image' % error)

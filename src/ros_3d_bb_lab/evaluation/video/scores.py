@@ -1,8 +1,9 @@
-"""Scores of boxes and tracks on a video, against the people that are marked in its images.
+"""Scores of boxes and tracks on a video, compared with the people that are annotated in its images.
 
-People of whom at least half is visible are scored. A box shows a person if their intersection over union is at least
-one half, one to one. It is false if it shows none, unless at least half of it lies on a person who is not scored.
-Tracks with the status VISIBLE have the box of their detection, and are compared with people in the same way.
+People are scored if at least half of the body is visible. A box shows a person if their intersection over union is at
+least one half; each person has at most one box. A box that shows no person is false, unless at least half of it lies on
+a person that is not scored. Tracks with the status VISIBLE have the box of their detection, and are compared with
+people in the same way.
 """
 import contextlib
 import io
@@ -32,7 +33,7 @@ class Step(NamedTuple):
 
 class Pairs(NamedTuple):
     """Rectangles of one image compared with people: `found` are (person, number of the rectangle), `scored` masks (n,)
-    the rectangles that are false if they show no person, and `people` are those who are scored."""
+    the rectangles that are false if they show no person, and `people` are the scored ones."""
 
     people: list
     found: list
