@@ -3,7 +3,8 @@
 People are scored if at least half of the body is visible. A box shows a person if their intersection over union is at
 least one half; each person has at most one box. A box that shows no person is false, unless at least half of it lies on
 a person that is not scored. Tracks with the status VISIBLE have the box of their detection, and are compared with
-people in the same way.
+people in the same way. One of them is false only if it is not on a person at all: if its box contains less than half of
+the visible part of each person. A box that is too large, or of a part of a person, is an error of the box.
 """
 import contextlib
 import io
@@ -17,7 +18,7 @@ from ros_3d_bb.tracking.association import assign
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb_lab.evaluation.tracking.metrics import trackeval_data, trackeval_metrics
 
-FOUND_IOU, LEAST_VISIBLE, ON_UNSCORED = 0.5, 0.5, 0.5
+FOUND_IOU, LEAST_VISIBLE, ON_UNSCORED, ON_PERSON = 0.5, 0.5, 0.5, 0.5
 NEAREST_M = 0.1  # nearer points are not projected
 
 
@@ -39,6 +40,7 @@ class Pairs(NamedTuple):
     found: list
     scored: np.ndarray
     overlaps: np.ndarray  # (people, n), intersection over union
+    empty: np.ndarray  # mask (n,) of the rectangles that are on no person, scored or not
 
     @property
     def false(self):
@@ -57,14 +59,24 @@ def compare(people, rects):
         if person.visible < LEAST_VISIBLE:
             is_scored &= _shares_on(person.rect_px, rects) < ON_UNSCORED
     is_scored[[column for _row, column in pairs]] = True
-    return Pairs(scored_people, [(scored_people[row], int(column)) for row, column in pairs], is_scored, overlaps)
+    is_empty = np.ones(len(rects), bool)
+    for person in people:
+        area = np.subtract(person.rect_px[2:], person.rect_px[:2]).prod()
+        is_empty &= _common_areas(person.rect_px, rects) < ON_PERSON * area
+    is_empty[[column for _row, column in pairs]] = False
+    return Pairs(scored_people, [(scored_people[row], int(column)) for row, column in pairs], is_scored, overlaps,
+                 is_empty)
+
+
+def _common_areas(rect, rects):
+    """Areas (n,) that rectangles have in common with another one."""
+    sides = np.minimum(rects[:, 2:], rect[2:]) - np.maximum(rects[:, :2], rect[:2])
+    return np.clip(sides, 0, None).prod(axis=1)
 
 
 def _shares_on(rect, rects):
     """Shares (n,) of rectangles that lie on another one."""
-    sides = np.minimum(rects[:, 2:], rect[2:]) - np.maximum(rects[:, :2], rect[:2])
-    areas = (rects[:, 2:] - rects[:, :2]).prod(axis=1)
-    return np.clip(sides, 0, None).prod(axis=1) / np.maximum(areas, 1)
+    return _common_areas(rect, rects) / np.maximum((rects[:, 2:] - rects[:, :2]).prod(axis=1), 1)
 
 
 def score_boxes(steps, truth):
@@ -87,7 +99,7 @@ def score_tracks(steps, truth, tracker, view):
         people_ids.append(np.array([person.id for person in pairs.people], int))
         track_ids.append(np.array([track.id for track in tracks], int)[pairs.scored])
         overlaps.append(pairs.overlaps[:, pairs.scored])
-        false += pairs.false
+        false += int(pairs.empty.sum())
         shown = [(person, tracks[number]) for person, number in pairs.found]
         lost = [track for track in step.tracks[tracker] if track.status != VISIBLE]
         found_ids = set(person.id for person, _track in shown)
