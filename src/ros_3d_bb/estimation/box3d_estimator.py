@@ -26,6 +26,9 @@ LEAST_SHARE = 0.02
 FEW = 0.2  # share of the samples from which on a layer has more than `LEAST_SHARE` of the weight, wherever it is
 LEAST_SUPPORT = 0.1  # minimum share of the samples with depth in the layer for an estimate; chosen
 TALL_M, ARMS_ABOVE_M = 1.8, 0.04  # chosen: people who appear taller may raise their arms so far above their heads
+# Height of the crotch relative to the usual height. In the session of `HIPS`, the RMSE of x is 0.039 m, with 0.4 to 1
+# at most 0.041 m, without it 0.045 m.
+LEGS = 0.47
 LEAST_WIDTH_M = 0.05  # chosen: of a body that is one pixel wide
 ARM_GAP_M = 0.15  # chosen: between an arm and the trunk
 BENT_M = 0.15  # chosen: before a level camera, the ends of people who walk are at most this far from their layer
@@ -228,16 +231,18 @@ def _widened(samples, depth, kind, rays, geometry):
 
 def _expected(kind, truncated):
     """What is expected of the rectangle of an ObjectClass: whether its left, upper and right edge show mainly what
-    surrounds the object, and the least height of the object, metres; 0 if it is unknown.
+    surrounds the object, the least height of the object, and that of a person of whom the image shows more than the
+    legs, metres; 0 if it is unknown.
 
     Below people is the floor, or what hides their legs. Other objects may be as rectangular as a chair. Where the image
     border truncates a person, an edge shows the person; at the left or the right, it is not known what surrounds them.
     """
     if kind.group != PERSON:
-        return (False, False, False), 0.0
-    cut_left, cut_top, cut_right, _cut_bottom = truncated
+        return (False, False, False), 0.0, 0.0
+    cut_left, cut_top, cut_right, cut_bottom = truncated
     least_m = 0.0 if cut_left or cut_right else LEAST_SIZE * kind.height
-    return (not cut_left, not cut_top, not cut_right), least_m
+    legs_m = LEGS * kind.height if cut_top and not cut_bottom else 0.0
+    return (not cut_left, not cut_top, not cut_right), least_m, legs_m
 
 
 class _Extents(NamedTuple):
@@ -285,7 +290,7 @@ def _visible_extents(samples, flat_px, geometry, may_repeat):
     middle_px = (left_px + right_px) / 2.0
     top_m = upper_m * slope_down(middle_px, top_px, geometry)
     bottom_m = lower_m * slope_down(middle_px, bottom_px, geometry)
-    left_m, right_m, trunk_m = samples.edges(on_body, bottom_m - FEET_M if looks_down else None)
+    left_m, right_m, trunk_m = samples.edges(on_body, bottom_m - top_m, bottom_m - FEET_M if looks_down else None)
     if bottom_m - top_m > TALL_M:
         head_px = top_px + samples.pixels_above_head(on_body, trunk_m, layer_m)
         head_m = layer_m * slope_down(middle_px, head_px, geometry)
