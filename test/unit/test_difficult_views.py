@@ -229,6 +229,16 @@ def test_a_person_who_crouches_behind_a_chest(camera_m, start_m, facing, height_
     assert scene.boxes(scene.rects_px)[0].center_m[2] == pytest.approx(scene.depths_m[0], abs=0.3)
 
 
+def test_legs_in_stride_before_a_low_camera_do_not_move_the_axis():
+    step_m = 1.2 * np.array([np.cos(-2.01), np.sin(-2.01)])
+    walker = {'start': ([1, 0] - step_m).tolist(), 'facing': -2.01,
+              'moves': [{'to': ([1, 0] + step_m).tolist(), 'speed': 1.2}]}
+    simulator = simulator_of([walker], 0.27, seconds=2.0, rate=1.0, seed=11)
+    scene = Scene(simulator, simulator.frame(1))
+    box, = scene.boxes(scene.rects_px)
+    assert scene.error_m(scene.frame.people[0], box) < 0.1
+
+
 POSES = {'still': {}, 'left arm out': dict(lift_l=1.57), 'right arm out': dict(lift_r=1.57),
          'both out': dict(lift_l=1.57, lift_r=1.57), 'left arm up': dict(lift_l=2.9),
          'both up': dict(lift_l=2.9, lift_r=2.9), 'bent': dict(bend=0.7)}
