@@ -81,8 +81,8 @@ class RectSamples(object):
 
     `rays` are the `level_rays`; `surrounded` states whether the left, the upper and the right edge show what surrounds
     the object, and `least_m` is the least height of an object that reaches the upper part of the rectangle if no nearer
-    one hides it (0: unknown). What is lower than `legs_m` is only the legs of a person. `shape` are the numbers of rows and columns, and `measured` is the number of samples with
-    depth and a viewing ray, masked or not.
+    one hides it (0: unknown). What is lower than `legs_m` is only the legs of a person. `shape` are the numbers of rows
+    and columns, and `measured` is the number of samples with depth and a viewing ray, masked or not.
     """
 
     def __init__(self, depth, rect_px, rays, surrounded, least_m=0.0, legs_m=0.0):
@@ -209,8 +209,8 @@ class RectSamples(object):
         return filled.any() and (filled | ~known).all()
 
     def edges(self, on_body, height_m, lowest_m=None):
-        """Left and right edge of the body whose samples and height are given, and the middle of its trunk, metres; those
-        above `lowest_m`, if there are any. If the median is near the middle of the edges, it stands for the trunk."""
+        """Left and right edge of the body whose samples and height are given, and the middle of its trunk, metres; of the
+        samples above `lowest_m`, if there are any. If the median is near the middle of the edges, it stands for the trunk."""
         if lowest_m is not None:
             above = on_body & (self._along(DOWN) < lowest_m)
             on_body = above if above.any() else on_body
