@@ -209,8 +209,11 @@ class RectSamples(object):
         return filled.any() and (filled | ~known).all()
 
     def edges(self, on_body, height_m, lowest_m=None):
-        """Left and right edge of the body whose samples and height are given, and the middle of its trunk, metres; of the
-        samples above `lowest_m`, if there are any. If the median is near the middle of the edges, it stands for the trunk."""
+        """Left and right edge of the body whose samples and height are given, and the middle of its trunk, metres.
+
+        They are those of the samples above `lowest_m`, if there are any. If the median is near the middle of the edges,
+        it stands for the trunk.
+        """
         if lowest_m is not None:
             above = on_body & (self._along(DOWN) < lowest_m)
             on_body = above if above.any() else on_body
