@@ -94,11 +94,12 @@ def blind_corners(ranges_m, limits_m, first_angle, step):
         points_m, limited_m = np.tile(points_m, (2, 1)), np.tile(limited_m, 2)
     with np.errstate(invalid='ignore'):  # between two infinite ranges
         jumps_m = np.diff(limited_m)
-    before, = np.nonzero(np.abs(jumps_m) > LEAST_ROOM_M)  # the last beams on obstacles
+        before, = np.nonzero(np.abs(jumps_m) > LEAST_ROOM_M)  # the last beams on obstacles
     if not len(before):
         return np.zeros((0, 3))
     first, last = np.append(0, before + 1), np.append(before, len(limited_m) - 1)  # beams on each obstacle
-    is_wide = np.linalg.norm(points_m[last] - points_m[first], axis=1) >= LEAST_WIDTH_M
+    with np.errstate(invalid='ignore'):
+        is_wide = np.linalg.norm(points_m[last] - points_m[first], axis=1) >= LEAST_WIDTH_M
     is_next = (jumps_m[before] < 0).astype(int)  # whether the nearer obstacle is the next one
     corners = (before + is_next)[is_wide[np.arange(len(before)) + is_next]]
     return points_m[np.unique(corners % count)]
