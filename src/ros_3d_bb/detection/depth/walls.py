@@ -134,4 +134,4 @@ def _filled(gradient, rays, inverse, everything):
 
 def _runs(mask):
     """First and last index, exclusive, of each run of True in a mask (n,)."""
-    return np.flatnonzero(np.diff(np.hstack((False, mask, False)))).reshape(-1, 2).tolist()
+    return np.flatnonzero(np.diff(np.hstack((False, mask, False)).astype(np.int8))).reshape(-1, 2).tolist()
