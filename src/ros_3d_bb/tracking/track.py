@@ -38,9 +38,7 @@ MIN_TRACK_SCORE = -2.0  # with less (12 % probability), tracks do not start, and
 SMOOTHING = 0.1  # weight of the newest detection in size, height and score
 SMOOTHED_HITS = 10  # number of detections from which on their mean has this weight
 CUT_SMOOTHING = 0.02  # the same for boxes that the image border truncates sideways: the head may be outside
-# Difference of the lower ends of a box and of its track from which on one of them does not show the legs, and the
-# weight of a box that does. Chosen: heights of people differ by less.
-LEGS_M, SHOWN_SMOOTHING = 0.2, 0.5
+LEGS_M = 0.2  # a lower end that is this much higher does not show the legs; chosen: heights of people differ by less
 CUT_LASTS_NS = NS // 2  # hysteresis: an end is visible again this long after it was last truncated
 LEAST_HEIGHT_M = 0.1
 STILL_MOVING = 0.5  # hysteresis: a moving track stops below this share of `moving_speed`
@@ -270,8 +268,8 @@ class Track(object):
         (width_m, depth_m, height_m), (new_width_m, new_depth_m, new_height_m) = self.size_m, measurement.size_m
         up_m, taller_m = measurement.z - self.z_m, new_height_m - height_m
         lower_up_m, upper_up_m = up_m - taller_m / 2, up_m + taller_m / 2
-        if not is_lower_held and self.lower.hits > 1 and abs(upper_up_m) < LEGS_M < abs(lower_up_m):
-            lower_share = CUT_SMOOTHING if lower_up_m > 0 else SHOWN_SMOOTHING
+        if not is_lower_held and self.lower.hits > 1 and abs(upper_up_m) < LEGS_M < lower_up_m:
+            lower_share = CUT_SMOOTHING
         lower_m, upper_m = lower_share * lower_up_m, upper_share * upper_up_m
         if is_lower_held:
             lower_m = upper_m
