@@ -231,8 +231,8 @@ def _widened(samples, depth, kind, rays, geometry):
 
 def _expected(kind, truncated):
     """What is expected of the rectangle of an ObjectClass: whether its left, upper and right edge show mainly what
-    surrounds the object, the least height of the object, and that of a person of whom the image shows more than the
-    legs, metres; 0 if it is unknown.
+    surrounds the object, the least height of the object, and that of a person if the image shows more than the legs,
+    metres; 0 if it is unknown.
 
     Below people is the floor, or what hides their legs. Other objects may be as rectangular as a chair. Where the image
     border truncates a person, an edge shows the person; at the left or the right, it is not known what surrounds them.

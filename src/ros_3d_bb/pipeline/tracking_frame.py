@@ -11,19 +11,13 @@ ODOM = re.compile('(^|[/_])odom')  # as in odom, robot1/odom and odom_combined
 
 
 class CameraPose(NamedTuple):
-    """Poses at the stamp of an image, (4, 4): of its camera in the tracking frame, and of the tracking frame in the
-    target frame, None if both are the same.
+    """Poses at the stamp of an image, (4, 4): of its camera in the target frame and in the tracking frame, and of the
+    tracking frame in the target frame, None if both are the same.
     """
 
+    target_from_camera: np.ndarray
     tracking_from_camera: np.ndarray
-    target_from_tracking: Optional[np.ndarray]
-
-    @property
-    def target_from_camera(self):
-        """Pose (4, 4) of the camera in the target frame."""
-        if self.target_from_tracking is None:
-            return self.tracking_from_camera
-        return self.target_from_tracking.dot(self.tracking_from_camera)
+    target_from_tracking: Optional[np.ndarray] = None
 
     def in_target(self, points_m):
         """Points (n, 3) of the tracking frame in the target frame."""
@@ -48,11 +42,12 @@ class TrackingFrame(object):
         """The CameraPose at a stamp. Raises tf2_ros.TransformException."""
         target_from_camera = self._transforms.lookup(self._target, camera_frame, stamp)
         if self._name is None:
-            self._name = self._continuous_frame(camera_frame.lstrip('/'))
+            self._name = self._continuous_frame(camera_frame)
         if self._name == self._target:
-            return CameraPose(target_from_camera, None)
-        return CameraPose(self._transforms.lookup(self._name, camera_frame, stamp),
-                          self._transforms.lookup(self._target, self._name, stamp))
+            return CameraPose(target_from_camera, target_from_camera)
+        tracking_from_camera = self._transforms.lookup(self._name, camera_frame, stamp)
+        return CameraPose(target_from_camera, tracking_from_camera,
+                          target_from_camera.dot(np.linalg.inv(tracking_from_camera)))
 
     def _continuous_frame(self, camera_frame):
         """The odometry frame next to the target frame, between it and a camera; the target frame if there is none."""

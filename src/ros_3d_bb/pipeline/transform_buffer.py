@@ -31,7 +31,7 @@ def upright_transform(transforms, floor_frame, camera_frame):
     try:
         return floor_frame, transforms.lookup(camera_frame, floor_frame, NEWEST)
     except tf2_ros.TransformException:
-        root = transforms.ancestors(camera_frame.lstrip('/'))[-1]
+        root = transforms.ancestors(camera_frame)[-1]
         camera_from_root = transforms.lookup(camera_frame, root, NEWEST)
         if viewing_fault(root, np.linalg.inv(camera_from_root)):
             raise
@@ -94,7 +94,7 @@ class TransformBuffer(tf2_ros.BufferCore):
 
     def ancestors(self, frame):
         """The frame and its ancestors, the root last."""
-        return path_to_root(self._parents, frame)
+        return path_to_root(self._parents, frame.lstrip('/'))
 
     def forget_later(self, target_frame, source_frame):
         """Forget what is later than the latest transforms of a frame between two others, if those were rejected."""
