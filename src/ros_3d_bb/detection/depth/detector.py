@@ -3,6 +3,7 @@
 Points above the floor are clustered. A cluster of human size is classified as a person by its shape in depth and by
 OpenCV's HOG people detector.
 """
+import itertools
 import math
 from typing import NamedTuple, Tuple
 
@@ -17,7 +18,8 @@ from ros_3d_bb.detection.depth.person_clusters import (DepthPeopleParams, find_p
 
 MEAN_HEIGHT_M, MEAN_WIDTH_M = 1.7, 0.5  # assumed for people who are partly outside the image
 SURE_SCORE = 0.9  # no further HOG scores are evaluated from this score on
-MAX_HOG_AGE = 2  # number of further images for which the HOG score of a person is used
+# A cluster that has hardly moved keeps its score for some images: scores take most of the time, and change slowly.
+MAX_SCORE_AGE, MOVED_M = 2, 0.1
 # Hysteresis, as of the thresholds of Canny (1986): a person who was sure in so many images continues with a lower
 # score, as one who crouches or is partly hidden, for a number of images. An image without the person counts as several
 # unless someone else hides the person. Chosen: furniture has lower scores or is seldom sure; 75 images are 5 s of the
@@ -34,15 +36,12 @@ MIN_DISTANCE_M = 0.35  # between the centres of two people; closer detections ar
 class DepthDetection(NamedTuple):
     """A detected person: box (x1, y1, x2, y2), score 0..1, and position to the right and ahead of the camera.
 
-    The HOG score is that of `hog_age` images ago. The person was sure in `sure` images, most recently `unsure` images
-    ago, with the height `height_m`.
+    The person was sure in `sure` images, most recently `unsure` images ago, with the height `height_m`.
     """
 
     box: Tuple[float, float, float, float]
     score: float
     position_m: Tuple[float, float]
-    hog: float
-    hog_age: int
     sure: int
     unsure: int
     height_m: float
@@ -58,6 +57,7 @@ class DepthPeople(object):
         self.reconfigure(params)
         self._hog, self._fitted_floor, self._known_floor = PersonHog(), FittedFloor(), KnownFloor()
         self._last_people = []  # DepthDetections in the last image, and those lost since
+        self._scores = []  # position, score and age in images, of the clusters in the last image
 
     def reconfigure(self, params):
         """Change the DepthPeopleParams. If two contradict each other, raise ValueError and keep the old ones."""
@@ -89,7 +89,7 @@ class DepthPeople(object):
         if grid is None:
             return None
         floor, pyramid = self.floor, Pyramid(image)
-        people = []
+        people, scores = [], []
         for blob, shape in find_person_clusters(grid, camera, self._params):
             box = box_of(blob, shape, grid, camera, floor)
             position_m = camera.rays((box[0] + box[2]) / 2.0, camera.cy)[0] * shape.depth_m, shape.depth_m
@@ -97,23 +97,20 @@ class DepthPeople(object):
             may_continue = last is not None and last.sure >= LEAST_SURE and last.unsure < MAX_UNSURE
             if not stands and not may_continue:
                 continue
-            features = shape_features_of(blob, shape, grid)
-            if person_score(features, BEST_HOG, shape.cut_top) < self._params.min_score:
-                continue  # rejected by its shape alone: HOG cannot raise the score enough
-            window = person_window_of(blob, shape, grid, camera, floor)
-            for hog, hog_age in self._hog_scores(pyramid, window, last):
-                score = person_score(features, hog, shape.cut_top)
-                if score >= SURE_SCORE:
-                    break
+            score, age = self._recent_score(position_m)
+            if age > MAX_SCORE_AGE:
+                window = person_window_of(blob, shape, grid, camera, floor)
+                score, age = self._score_of(blob, shape, grid, pyramid, window), 0
+            scores.append((position_m, score, age))
             if score >= self._params.min_score and stands:
                 sure, height_m = last.sure + 1 if last else 1, MEAN_HEIGHT_M if shape.cut_top else shape.top_m
-                people.append(DepthDetection(box, score, position_m, hog, hog_age, sure, 0, height_m))
+                people.append(DepthDetection(box, score, position_m, sure, 0, height_m))
             elif may_continue and score >= (LEGS_SCORE if shape.cut_top else CONTINUED_SCORE):
                 if not is_human(shape):
                     box, position_m = _completed_part(box, shape, last, camera, floor)
-                people.append(last._replace(box=box, score=score, position_m=position_m, hog=hog, hog_age=hog_age,
+                people.append(last._replace(box=box, score=score, position_m=position_m,
                                             unsure=last.unsure + (not shape.cut_top)))
-        people = _without_repeated(people)
+        people, self._scores = _without_repeated(people), scores
         self._last_people = people + self._lost(people)
         return _merged_detections([_completed(person, people, camera, floor) for person in people])
 
@@ -145,18 +142,24 @@ class DepthPeople(object):
             is_hidden = any(_hidden_share(person, other) for other in people)
             unsure = person.unsure + (1 if is_hidden else NOT_FOUND)
             if unsure < MAX_UNSURE and not _is_beside(person, people):
-                lost.append(person._replace(unsure=unsure, hog_age=MAX_HOG_AGE))
+                lost.append(person._replace(unsure=unsure))
         return lost
 
-    def _hog_scores(self, pyramid, window, last):
-        """Yield HOG scores and their ages: the lowest one, which a sure shape does not need to be raised, that of the
-        person in the last image, if any, then new ones.
-        """
-        yield LOW_SCORE, MAX_HOG_AGE
-        if last is not None and last.hog_age < MAX_HOG_AGE:
-            yield last.hog, last.hog_age + 1
-        for hog in self._hog.scores(pyramid, window):
-            yield hog, 0
+    def _recent_score(self, position_m):
+        """The score of a cluster in an earlier image, and its age in images."""
+        return next(((score, age + 1) for place_m, score, age in self._scores
+                     if _distance_m(place_m, position_m) < MOVED_M), (0.0, MAX_SCORE_AGE + 1))
+
+    def _score_of(self, blob, shape, grid, pyramid, window):
+        """Score of a cluster: HOG is evaluated only where it decides."""
+        features, score = shape_features_of(blob, shape, grid), 0.0
+        if person_score(features, BEST_HOG, shape.cut_top) < self._params.min_score:
+            return score  # rejected by its shape alone
+        for hog in itertools.chain([LOW_SCORE], self._hog.scores(pyramid, window)):
+            score = person_score(features, hog, shape.cut_top)
+            if score >= SURE_SCORE:
+                break
+        return score
 
 
 def person_window_of(blob, shape, grid, camera, floor):

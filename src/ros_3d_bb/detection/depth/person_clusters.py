@@ -105,11 +105,7 @@ def grid_of(depth, camera, floor, params):
     depth_m = values.astype(np.float32) * np.float32(depth.scale_m)
     with np.errstate(invalid='ignore'):  # nan
         depth_m[~((depth_m > params.min_depth) & (depth_m < 100))] = 0
-    x, y = _rays(camera, step)
-    ahead = np.array([0, 0, 1]) - floor.normal[2] * floor.normal
-    ahead /= np.linalg.norm(ahead)
-    rays = np.stack([np.float32(axis[0] * x + axis[1] * y + axis[2])
-                     for axis in (np.cross(ahead, floor.normal), ahead, floor.normal)])
+    rays = _rays(camera, step, *floor.normal.tolist())
     return Grid(depth_m, depth_m * rays[2] + np.float32(floor.offset_m), depth_m * rays[1], rays, step,
                 _ends(depth_m > 0))
 
@@ -121,10 +117,15 @@ def _ends(valid):
     return sides, valid.argmax(axis=0), len(valid) - 1 - valid[::-1].argmax(axis=0)
 
 
-@functools.lru_cache(maxsize=8)  # undistortion takes longer than the rest
-def _rays(camera, step):
-    """Viewing rays of the cells of a grid, as `Camera.rays`."""
-    return camera.rays(np.arange(step // 2, camera.width, step), np.arange(step // 2, camera.height, step)[:, None])
+@functools.lru_cache(maxsize=8)  # takes longer than the rest, and the floor seldom changes
+def _rays(camera, step, *normal):
+    """Viewing rays (3, rows, columns) of the cells of a grid: to the right, ahead and up, given the normal of the
+    floor."""
+    x, y = camera.rays(np.arange(step // 2, camera.width, step), np.arange(step // 2, camera.height, step)[:, None])
+    ahead = np.array([0, 0, 1]) - normal[2] * np.array(normal)
+    ahead /= np.linalg.norm(ahead)
+    return np.stack([np.float32(axis[0] * x + axis[1] * y + axis[2])
+                     for axis in (np.cross(ahead, normal), ahead, normal)])
 
 
 def find_person_clusters(grid, camera, params):
@@ -149,7 +150,9 @@ def _foreground_cells(grid, params):
     """
     depth_m = grid.depth_m
     cells = (depth_m > 0) & (grid.height_m > FLOOR_M)
-    cells[cells] = ~is_wall(grid.rays[:, cells], depth_m[cells], grid.height_m[cells])
+    used = np.flatnonzero(cells)
+    cells.ravel()[used] = ~is_wall(grid.rays.reshape(3, -1).take(used, axis=1), depth_m.take(used),
+                                   grid.height_m.take(used))
     cells &= (depth_m < params.max_depth + NOISE * params.max_depth ** 2) & (grid.height_m < CEILING_M)
     for after, before in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):
         change_m = depth_m[after] - depth_m[before]
