@@ -161,13 +161,13 @@ class RgbdSource(object):
         self._used_ns = depth.stamp_ns
         self._on_match(trigger.value, depth.value, camera)
 
-    def _on_lost(self, trigger, before_jump):
-        inputs = '2D boxes' if isinstance(trigger.value, Boxes2D) else 'colour images'
+    def _on_lost(self, trigger, stamp_ns, before_jump):
+        inputs = '2D boxes' if isinstance(trigger, Boxes2D) else 'colour images'
         if before_jump:
             self._events.count('%s from before a time jump' % inputs)
             return
         with self._events.rejecting(inputs):
-            raise ValueError(self._why_lost(trigger.stamp_ns))
+            raise ValueError(self._why_lost(stamp_ns))
 
     def _why_lost(self, stamp_ns):
         """Return an error message that names the missing input and its topic."""
