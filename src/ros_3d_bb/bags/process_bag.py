@@ -59,7 +59,7 @@ def _settings_from(given):
             settings = settings._replace(**{node: read_params(path, getattr(settings, node))})
         except (ValueError, OSError, yaml.YAMLError) as error:
             raise ValueError('%s: %s' % (option, error))
-    cameras = given.cameras and [camera.strip() for camera in given.cameras.split(',')]
+    cameras = given.cameras and [name.strip() for name in given.cameras.split(',')]
     for node, name, value in (('yolov5', 'weights', given.weights), ('bbox3d', 'error_model', given.error_model),
                               ('tracker', 'error_model', given.error_model),
                               ('tracker', 'target_frame', given.target_frame), ('tracker', 'cameras', cameras)):
@@ -79,7 +79,7 @@ def _check_names(settings):
     """Raise ValueError if a remapped topic is not one of the nodes with these cameras and this kind of depth."""
     unmapped = settings._replace(names={})
     topics = [unmapped.name(topic)[1:] for topic in OUTPUTS + (TF_TOPIC, STATIC_TOPIC)] + [
-        unmapped.name(topic, camera)[1:] for camera in settings.cameras
+        unmapped.name(topic, name)[1:] for name in settings.camera_names
         for topic in set(INPUTS).union(OUTPUTS_OF_CAMERA) - {TF_TOPIC, STATIC_TOPIC}]
     for ours, theirs in settings.names.items():
         if ours not in topics:

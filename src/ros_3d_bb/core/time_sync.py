@@ -323,57 +323,57 @@ class CameraClocks(object):
         """The newest stamp of a tracked image; None if there is none since the last `restart`."""
         return max(self._newest_ns.values(), default=None)
 
-    def accept(self, stamp_ns: int, now_ns: int, camera: str) -> Optional[str]:
+    def accept(self, stamp_ns: int, now_ns: int, camera_name: str) -> Optional[str]:
         """Check the stamp of an image that arrived at `now_ns`, see `arrival_clock_ns`.
 
         Returns None if the image is accepted; otherwise the camera with the correct time. Raises ValueError if the
         latest tracked image of the camera has this stamp.
         """
-        if camera in self._tracked and stamp_ns == self._tracked[camera].stamp_ns:
-            raise ValueError('duplicate stamp %.9f of camera %r' % (stamp_ns / NS, camera))
+        if camera_name in self._tracked and stamp_ns == self._tracked[camera_name].stamp_ns:
+            raise ValueError('duplicate stamp %.9f of camera %r' % (stamp_ns / NS, camera_name))
         alive = {name: clock for name, clock in self._clocks.items() if now_ns - clock.arrival_ns <= ALIVE_NS}
-        clock = alive[camera] = self._continued(_Clock(stamp_ns, now_ns), camera, alive)
+        clock = alive[camera_name] = self._continued(_Clock(stamp_ns, now_ns), camera_name, alive)
 
         def rank(name: str) -> Tuple[int, float, int]:
             own = alive[name]
             supporters = sum(own.is_near(other, LONGEST_LAG_NS) for other in alive.values())
             return supporters, -own.since_ns, own.stamp_ns - own.arrival_ns
-        trusted, is_accepted = camera, True
+        trusted, is_accepted = camera_name, True
         if len(alive) > 1:
-            trusted = max([name for name in alive if name == camera or self._is_tracked(name, now_ns)], key=rank)
+            trusted = max([name for name in alive if name == camera_name or self._is_tracked(name, now_ns)], key=rank)
             is_accepted = clock.is_near(alive[trusted], JUMP_NS)
-        self._clocks[camera] = clock._replace(since_ns=min(clock.since_ns, now_ns) if is_accepted else NEVER)
+        self._clocks[camera_name] = clock._replace(since_ns=min(clock.since_ns, now_ns) if is_accepted else NEVER)
         return None if is_accepted else trusted
 
-    def _continued(self, clock: _Clock, camera: str, alive: Dict[str, _Clock]) -> _Clock:
+    def _continued(self, clock: _Clock, camera_name: str, alive: Dict[str, _Clock]) -> _Clock:
         """The clock with `since_ns` from the camera's previous image, or from the other cameras with the same time."""
-        former = self._clocks.get(camera)
+        former = self._clocks.get(camera_name)
         if former is not None and former.since_ns != NEVER:
             passed_ns, advance_ns = clock.arrival_ns - former.arrival_ns, clock.stamp_ns - former.stamp_ns
             if -JUMP_NS <= advance_ns <= passed_ns + JUMP_NS:  # the stamp jumps neither back nor ahead of the arrivals
                 return clock._replace(since_ns=former.since_ns)
         limit_ns = LONGEST_LAG_NS if former is None else JUMP_NS
         return clock._replace(since_ns=min((other.since_ns for name, other in alive.items()
-                                            if name != camera and clock.is_near(other, limit_ns)), default=NEVER))
+                                            if name != camera_name and clock.is_near(other, limit_ns)), default=NEVER))
 
-    def track(self, stamp_ns: int, camera: str) -> int:
+    def track(self, stamp_ns: int, camera_name: str) -> int:
         """Record that the latest accepted image of a camera was tracked. Returns the newest stamp of tracked images."""
-        self._tracked[camera] = self._clocks[camera]
-        self._newest_ns[camera] = max(stamp_ns, self._newest_ns.get(camera, stamp_ns))
+        self._tracked[camera_name] = self._clocks[camera_name]
+        self._newest_ns[camera_name] = max(stamp_ns, self._newest_ns.get(camera_name, stamp_ns))
         return max(self._newest_ns.values())
 
-    def is_jump_back(self, stamp_ns: int, now_ns: int, camera: str) -> bool:
+    def is_jump_back(self, stamp_ns: int, now_ns: int, camera_name: str) -> bool:
         """Whether an accepted image is a backward jump in time, and not a camera that lags behind an ended one."""
         if stamp_ns >= max(self._newest_ns.values(), default=stamp_ns) - JUMP_NS:
             return False
         ahead = {other: newest_ns for other, newest_ns in self._newest_ns.items() if stamp_ns < newest_ns - JUMP_NS}
-        return (camera in ahead or any(self._is_tracked(other, now_ns) for other in ahead)
+        return (camera_name in ahead or any(self._is_tracked(other, now_ns) for other in ahead)
                 or stamp_ns < max(ahead.values(), default=stamp_ns) - LONGEST_LAG_NS)
 
     def restart(self) -> None:
         """Forget the newest stamps, after a backward jump in time."""
         self._newest_ns = {}
 
-    def _is_tracked(self, camera: str, now_ns: int) -> bool:
+    def _is_tracked(self, camera_name: str, now_ns: int) -> bool:
         """Whether an image of a camera was tracked within the last `ALIVE_NS`."""
-        return camera in self._tracked and now_ns - self._tracked[camera].arrival_ns <= ALIVE_NS
+        return camera_name in self._tracked and now_ns - self._tracked[camera_name].arrival_ns <= ALIVE_NS

@@ -60,23 +60,23 @@ class Settings(NamedTuple):
         return set(INPUTS) - unused
 
     @property
-    def cameras(self):
+    def camera_names(self):
         """Namespaces of the cameras; '' for a single camera."""
         return tuple(self.tracker[0].cameras) or ('',)
 
-    def name(self, topic, camera=''):
+    def name(self, topic, camera_name=''):
         """Return the name that is used for a topic of a camera's nodes."""
         if topic in (DEPTH_TOPIC, DEPTH_INFO_TOPIC):
             topic = DEPTH_TOPICS[self.bbox3d[0].depth][topic == DEPTH_INFO_TOPIC]
-        topic = topic_of(camera, topic)
+        topic = topic_of(camera_name, topic)
         return absolute(self.names.get(topic, topic))
 
-    def source(self, camera, events, on_match, transforms):
+    def source(self, camera_name, events, on_match, transforms):
         """Return the RgbdSource of a camera for detection and estimation. ValueError if their parameters differ."""
         params = self.bbox3d[0]
         if self.detector == 'depth':
             check_equal(self.depth[0], params)
-        topics = [self.name(topic, camera) for topic in (DEPTH_TOPIC, DEPTH_INFO_TOPIC, INFO_TOPIC)]
+        topics = [self.name(topic, camera_name) for topic in (DEPTH_TOPIC, DEPTH_INFO_TOPIC, INFO_TOPIC)]
         return RgbdSource(params, events, on_match, transforms, topics, params.cache_length, params.assumed_delay)
 
 
@@ -103,29 +103,29 @@ class PeoplePipeline(object):
         self._markers = MarkerWriter(marker_params)
         self._tracking_stage = TrackingStage(tracker_params, tracking, events, transforms, self._on_tracks)
         self._cameras = {}
-        for camera in settings.cameras:
-            pipeline = self._cameras[camera] = CameraPipeline()
-            pipeline.source = settings.source(camera, events, pipeline.on_match, transforms)
+        for camera_name in settings.camera_names:
+            pipeline = self._cameras[camera_name] = CameraPipeline()
+            pipeline.source = settings.source(camera_name, events, pipeline.on_match, transforms)
             pipeline.connect_estimator(EstimationStage(settings.bbox3d[0], events), events,
-                                       functools.partial(self._on_boxes3d, camera))
+                                       functools.partial(self._on_boxes3d, camera_name))
             if settings.detector == 'depth':
                 pipeline.connect_detector(DepthDetectionStage(*settings.depth, events),
-                                          functools.partial(self._detect, camera))
+                                          functools.partial(self._detect, camera_name))
         self._now_ns = 0  # time of the message that is being processed
 
-    def take(self, topic, message, now_ns, camera=''):
+    def take(self, topic, message, now_ns, camera_name=''):
         """Process a message on one of the `INPUTS` except tf, which arrived at `now_ns`. Raises ValueError."""
         self._now_ns = now_ns
-        source, tracking_stage = self._cameras[camera].source, self._tracking_stage
+        source, tracking_stage = self._cameras[camera_name].source, self._tracking_stage
         if topic in INFO_TOPICS:
             images = COLOR_INFO_IMAGES[self._settings.bbox3d[0].depth] if topic == INFO_TOPIC else DEPTH_TOPIC
-            message = info_of_images(message, self._settings.name(images, camera))
+            message = info_of_images(message, self._settings.name(images, camera_name))
         if topic == INFO_TOPIC:
-            tracking_stage.add_camera_info(message, camera)
+            tracking_stage.add_camera_info(message, camera_name)
             source.add_camera_info(message, now_ns)
         elif topic == DEPTH_INFO_TOPIC:
             if self._settings.tracker[0].use_depth:
-                tracking_stage.add_depth_camera_info(message, camera)
+                tracking_stage.add_depth_camera_info(message, camera_name)
             source.add_depth_camera_info(message, now_ns)
         elif topic == DEPTH_TOPIC:
             source.add_depth(message, now_ns)
@@ -134,13 +134,13 @@ class PeoplePipeline(object):
         else:
             source.add_boxes(message, now_ns)
 
-    def add_detections(self, header, image, detections, names, now_ns, camera=''):
+    def add_detections(self, header, image, detections, names, now_ns, camera_name=''):
         """Process the Detections in a received colour image (height, width, 3) with the given header; `names` are those
         of the classes."""
         self._now_ns = now_ns
-        message = self._boxes2d(camera, header, image, detections, names)
+        message = self._boxes2d(camera_name, header, image, detections, names)
         if message is not None:
-            self._cameras[camera].source.add_boxes(message, now_ns, image)
+            self._cameras[camera_name].source.add_boxes(message, now_ns, image)
 
     def take_results(self):
         """Return the messages that the nodes would have published since the last call, [(topic, message), ...]."""
@@ -161,30 +161,30 @@ class PeoplePipeline(object):
         for pipeline in self._cameras.values():
             pipeline.source.end()
 
-    def _detect(self, camera, color_msg, *matched):
+    def _detect(self, camera_name, color_msg, *matched):
         with self.detecting():
-            detected = self._cameras[camera].detect(color_msg, *matched)
+            detected = self._cameras[camera_name].detect(color_msg, *matched)
             if detected is None:
                 return
             image, detections, *shown = detected
-            message = self._boxes2d(camera, color_msg.header, image, detections, DepthDetectionStage.names)
+            message = self._boxes2d(camera_name, color_msg.header, image, detections, DepthDetectionStage.names)
             if message is not None:
-                self._cameras[camera].estimate(message, *shown)
+                self._cameras[camera_name].estimate(message, *shown)
 
-    def _boxes2d(self, camera, header, image, detections, names):
+    def _boxes2d(self, camera_name, header, image, detections, names):
         """Return the message of Detections, None if it is not published."""
         if not len(detections.boxes) and not self._publish_empty:
             return None
         message = detections2d_to_msg(detections, names, header, image.shape[1::-1])
-        self._results.append((topic_of(camera, BOXES_TOPIC), message))
+        self._results.append((topic_of(camera_name, BOXES_TOPIC), message))
         return message
 
-    def _on_boxes3d(self, camera, message, _boxes3d, _frame, depth_msg):
-        self._results.append((topic_of(camera, BOXES3D_TOPIC), message))
+    def _on_boxes3d(self, camera_name, message, _boxes3d, _frame, depth_msg):
+        self._results.append((topic_of(camera_name, BOXES3D_TOPIC), message))
         if self._settings.tracker[0].use_depth:
-            self._tracking_stage.add_depth(depth_msg, self._now_ns, camera)
+            self._tracking_stage.add_depth(depth_msg, self._now_ns, camera_name)
         with self._events.rejecting('3D boxes'):
-            self._tracking_stage.add_boxes(message, self._now_ns, camera)
+            self._tracking_stage.add_boxes(message, self._now_ns, camera_name)
 
     def _on_tracks(self, tracks, header):
         if tracks:

@@ -94,7 +94,7 @@ class TrackingStage(object):
         _check(params)
         params = params._replace(target_frame=params.target_frame.lstrip('/'))  # tf2 rejects frames with a slash
         self._params, self._events, self._on_tracks = params, events, on_tracks
-        self.cameras = tuple(params.cameras) or ('',)
+        self.camera_names = tuple(params.cameras) or ('',)
         self._classes = read_object_classes(params.classes_file)
         model = error_model_of_param(params.error_model)
         self._tracker = Tracker(*tracking, last_id=last_id, classes=self._classes,
@@ -103,15 +103,15 @@ class TrackingStage(object):
         self._clocks = CameraClocks()
         self._jumps = 0  # number of backward jumps in time
         self._boxes_ns = {}  # newest stamp of tracked boxes, by camera
-        self._recent_ns = {camera: collections.deque(maxlen=RECENT) for camera in self.cameras}  # stamps of boxes
+        self._recent_ns = {name: collections.deque(maxlen=RECENT) for name in self.camera_names}  # stamps of boxes
         self._frames, self._intrinsics = {}, {}  # by camera
         self._frame = TrackingFrame(transforms, params.tracking_frame, params.target_frame)
         self._areas = _areas_of(params)
         self._poses = {}  # latest CameraPose, by camera
         self._newest_pose = None
-        self._depths = {camera: MessageCache(int(params.depth_cache_length * NS)) for camera in self.cameras}
-        self._registrations = {camera: DepthRegistration(transforms, topic_of(camera, DEPTH_TOPICS[RAW][1]))
-                               for camera in self.cameras if params.depth == RAW}
+        self._depths = {name: MessageCache(int(params.depth_cache_length * NS)) for name in self.camera_names}
+        self._registrations = {name: DepthRegistration(transforms, topic_of(name, DEPTH_TOPICS[RAW][1]))
+                               for name in self.camera_names if params.depth == RAW}
 
     def reconfigure(self, params, tracking):
         """Use other tracking parameters and ignored areas for the next boxes; tracks are kept, except those in other
@@ -130,8 +130,8 @@ class TrackingStage(object):
     @property
     def views_m(self):
         """Outlines, arrays (3, 2) in the target frame, of the fields of view of the cameras."""
-        return [CameraView(pose.target_from_camera, self._intrinsics[camera]).outline(SHOWN_RANGE_M)
-                for camera, pose in sorted(self._poses.items()) if camera in self._intrinsics]
+        return [CameraView(pose.target_from_camera, self._intrinsics[name]).outline(SHOWN_RANGE_M)
+                for name, pose in sorted(self._poses.items()) if name in self._intrinsics]
 
     def set_map(self, message):
         """Start no tracks in the occupied cells of a nav_msgs/OccupancyGrid. With the first one, those there end.
@@ -159,34 +159,34 @@ class TrackingStage(object):
             return any(areas.contains(point_m, camera_m) for camera_m in cameras_m)
         self._tracker.delete_at(is_ignored)
 
-    def add_camera_info(self, message, camera=''):
+    def add_camera_info(self, message, camera_name=''):
         """Add a sensor_msgs/CameraInfo. Raises ValueError if it is invalid."""
-        self._intrinsics[camera] = camera_from_msg(message)
+        self._intrinsics[camera_name] = camera_from_msg(message)
 
-    def add_depth_camera_info(self, message, camera=''):
+    def add_depth_camera_info(self, message, camera_name=''):
         """Add a sensor_msgs/CameraInfo of the depth camera, for raw depth. Raises ValueError if it is invalid."""
-        self._registrations[camera].add_camera_info(message)
+        self._registrations[camera_name].add_camera_info(message)
 
-    def add_depth(self, message, now_ns, camera=''):
+    def add_depth(self, message, now_ns, camera_name=''):
         """Add a depth image. Raises ValueError if it has no stamp; if it is invalid otherwise, it is counted."""
         stamp_ns = stamp_of(message)
         with self._events.rejecting('depth images'):
             depth = imgmsg_to_depth(message, self._params.depth_scale)
-            self._depths[camera].add(stamp_ns, now_ns, (depth, message.header.frame_id))
+            self._depths[camera_name].add(stamp_ns, now_ns, (depth, message.header.frame_id))
 
-    def add_boxes(self, message, now_ns, camera=''):
+    def add_boxes(self, message, now_ns, camera_name=''):
         """Process a BoundingBox3DArray: `on_tracks` is called unless the transform is missing, or the stamp is
         inconsistent with those of the other cameras. Raises ValueError if the message or each of its boxes is invalid,
         or the boxes are in the fixed frame.
         """
-        stamp_ns, camera_name = stamp_of(message), camera or message.header.frame_id
-        frame_id, target_frame = self._params.camera_frame or message.header.frame_id, self._params.target_frame
+        stamp_ns, target_frame = stamp_of(message), self._params.target_frame
+        frame_id = self._params.camera_frame or message.header.frame_id
         if not frame_id:
             raise ValueError('their images have no frame_id; set ~frame_id to the optical frame of the camera')
         if frame_id.lstrip('/') == target_frame:
             raise ValueError('%s (~target_frame); %s' % (target_frame_fault(target_frame, frame_id), POSE))
         with self.lock:
-            if not self._accept(stamp_ns, now_ns, camera):
+            if not self._accept(stamp_ns, now_ns, camera_name):
                 return
             jumps = self._jumps
         try:  # not under the lock: waiting for the transform of one camera must not delay the others
@@ -200,12 +200,12 @@ class TrackingStage(object):
             return
         with self.lock:
             if jumps == self._jumps:
-                self._track(message, stamp_ns, pose, camera, camera_name)
+                self._track(message, stamp_ns, pose, camera_name)
             else:
                 self._events.warn(BEHIND, 'boxes at %.3f are dropped: time jumped back while their transform was '
                                   'awaited' % (stamp_ns / NS))
 
-    def _track(self, message, stamp_ns, pose, camera, camera_name):
+    def _track(self, message, stamp_ns, pose, camera_name):
         fault = viewing_fault(self._params.camera_frame or message.header.frame_id, pose.target_from_camera)
         if fault:
             self._tracker.skip(stamp_ns, camera_name)
@@ -216,27 +216,27 @@ class TrackingStage(object):
         if faults and not boxes:  # differs from an image without people
             self._tracker.skip(stamp_ns, camera_name)
             raise ValueError('none of their %d boxes is valid; tracks are kept as they are' % len(faults))
-        if camera:
-            self._check_frame(message.header.frame_id, camera)
+        if camera_name:
+            self._check_frame(message.header.frame_id, camera_name)
         untracked_boxes = self._tracker.untracked_boxes
         detections = self._without_ignored(detections_from_boxes(boxes, pose.tracking_from_camera, self._classes), pose)
         tracks = self._tracker.update(stamp_ns, detections,
-                                      self._view(message.header, pose.tracking_from_camera, camera, camera_name))
+                                      self._view(message.header, pose.tracking_from_camera, camera_name))
         self._events.count('images tracked')
         untracked_boxes = self._tracker.untracked_boxes - untracked_boxes
         if untracked_boxes > 0:
             self._events.count('3D boxes that became no track', untracked_boxes)
-        if len(self.cameras) > 1 and CONTRADICTION not in self._events.counts:
+        if len(self.camera_names) > 1 and CONTRADICTION not in self._events.counts:
             contradicting = self._tracker.contradicting_cameras
             if contradicting:
                 self._events.warn(CONTRADICTION, '%s and %s each detect another one of two tracks nearby, as if they '
                                   'showed one person in two places: check the poses of these cameras in tf'
                                   % contradicting)
-        newest_ns = self._clocks.track(stamp_ns, camera)
-        self._boxes_ns[camera], self._poses[camera] = stamp_ns, pose
+        newest_ns = self._clocks.track(stamp_ns, camera_name)
+        self._boxes_ns[camera_name], self._poses[camera_name] = stamp_ns, pose
         if stamp_ns == newest_ns:
             self._newest_pose = pose
-        self._check_rate(stamp_ns, camera)
+        self._check_rate(stamp_ns, camera_name)
         silent = self._silent_cameras(newest_ns)
         if silent:
             self._events.warn('tracks withheld', 'no boxes of %s were tracked within the last %g s (~camera_timeout): '
@@ -258,9 +258,9 @@ class TrackingStage(object):
         self._events.count('boxes in ignored areas', sum(detection.is_ignored for detection in detections))
         return detections
 
-    def _check_rate(self, stamp_ns, camera):
+    def _check_rate(self, stamp_ns, camera_name):
         """Report images so far apart that the tracker assigns no boxes of people who move."""
-        recent_ns = self._recent_ns[camera]
+        recent_ns = self._recent_ns[camera_name]
         recent_ns.append(stamp_ns)
         period_ns = median_period_ns(list(recent_ns))
         if len(recent_ns) == RECENT and (1 + JITTER) * period_ns > LONGEST_NS and TOO_SLOW not in self._events.counts:
@@ -270,44 +270,44 @@ class TrackingStage(object):
     def _silent_cameras(self, newest_ns):
         """Names of the cameras whose newest boxes are older than ~camera_timeout."""
         timeout_s = self._params.camera_timeout or float('inf')
-        return [camera for camera in self.cameras
-                if newest_ns - self._boxes_ns.get(camera, float('-inf')) > timeout_s * NS]
+        return [name for name in self.camera_names
+                if newest_ns - self._boxes_ns.get(name, float('-inf')) > timeout_s * NS]
 
-    def _view(self, header, tracking_from_camera, camera, camera_name):
+    def _view(self, header, tracking_from_camera, camera_name):
         """Return the CameraView of boxes with this header, with intrinsics and depth if they are known."""
-        view = CameraView(tracking_from_camera, self._intrinsics.get(camera), camera_name)
-        entry = self._depths[camera].matching(header.stamp.to_nsec(), int(self._params.stamp_tolerance * NS))
+        view = CameraView(tracking_from_camera, self._intrinsics.get(camera_name), camera_name)
+        entry = self._depths[camera_name].matching(header.stamp.to_nsec(), int(self._params.stamp_tolerance * NS))
         if view.intrinsics is None or entry is None:
             return view
-        return self._with_depth(view, *entry.value, camera, header.frame_id)
+        return self._with_depth(view, *entry.value, camera_name, header.frame_id)
 
-    def _with_depth(self, view, depth, depth_frame, camera, boxes_frame):
+    def _with_depth(self, view, depth, depth_frame, camera_name, boxes_frame):
         """Return a CameraView with a depth image; without one that cannot be used, which bbox3d_node reports."""
         intrinsics = view.intrinsics
-        if camera not in self._registrations:
+        if camera_name not in self._registrations:
             if depth.values.shape != (intrinsics.height, intrinsics.width):
                 return view
             return view._replace(depth_at=functools.partial(depths_towards, intrinsics, depth),
                                  measured_area=depth.measured_area)
         try:
-            geometry = self._registrations[camera].geometry(depth, depth_frame, intrinsics,
-                                                            self._params.camera_frame or boxes_frame)
+            geometry = self._registrations[camera_name].geometry(depth, depth_frame, intrinsics,
+                                                                 self._params.camera_frame or boxes_frame)
         except ValueError:
             return view
         return view._replace(depth_at=functools.partial(_depths_from_beside, geometry, depth),
                              measured_area=lambda: geometry.area_px)
 
-    def _accept(self, stamp_ns, now_ns, camera):
+    def _accept(self, stamp_ns, now_ns, camera_name):
         """Whether the stamp of boxes is consistent with those of the other cameras. Handles backward jumps in time, as
         when a bag is looped or rewound: tracks are discarded."""
-        trusted = self._clocks.accept(stamp_ns, now_ns, camera)
+        trusted = self._clocks.accept(stamp_ns, now_ns, camera_name)
         if trusted is not None:
             newest_ns = self._clocks.newest_ns or stamp_ns
             self._events.warn(AHEAD if stamp_ns > newest_ns else BEHIND, 'boxes of %s at %.3f are dropped: their stamp '
                               'is %.3f s from the newest one, and %s has the correct time; they are tracked once that '
                               'camera agrees or ends'
-                              % (camera, stamp_ns / NS, (stamp_ns - newest_ns) / NS, trusted))
-        elif self._clocks.is_jump_back(stamp_ns, now_ns, camera):
+                              % (camera_name, stamp_ns / NS, (stamp_ns - newest_ns) / NS, trusted))
+        elif self._clocks.is_jump_back(stamp_ns, now_ns, camera_name):
             self._events.note('jumps back in time', 'time jumped back from %.3f to %.3f: earlier tracks are discarded'
                               % (self._clocks.newest_ns / NS, stamp_ns / NS))
             self._tracker.reset()
@@ -316,12 +316,12 @@ class TrackingStage(object):
             self._jumps += 1
         return trusted is None
 
-    def _check_frame(self, frame_id, camera):
+    def _check_frame(self, frame_id, camera_name):
         """Report cameras that share a frame, because tf then gives them the same position."""
-        if self._frames.get(camera) == frame_id:
+        if self._frames.get(camera_name) == frame_id:
             return
-        self._frames[camera] = frame_id
-        cameras = [other for other in self.cameras if self._frames.get(other) == frame_id]
+        self._frames[camera_name] = frame_id
+        cameras = [other for other in self.camera_names if self._frames.get(other) == frame_id]
         if len(cameras) > 1:
             self._events.note('cameras sharing a frame', 'the boxes of %s are all in the frame %s and are tracked as '
                               'if the cameras had the same pose; each camera needs its own frame'
@@ -346,8 +346,8 @@ def _check(params):
     fault = target_frame_fault(params.target_frame, params.camera_frame)
     if fault:
         raise ValueError('parameter ~target_frame: %s; %s' % (fault, POSE))
-    for camera in params.cameras:
-        if not (isinstance(camera, str) and NAMESPACE.match(camera)) or list(params.cameras).count(camera) > 1:
+    for name in params.cameras:
+        if not (isinstance(name, str) and NAMESPACE.match(name)) or list(params.cameras).count(name) > 1:
             raise ValueError('parameter ~cameras is %s; different namespaces expected, such as front, rear'
                              % list(params.cameras))
     if params.cameras and params.camera_frame:
