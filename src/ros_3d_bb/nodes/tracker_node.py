@@ -67,7 +67,7 @@ class TrackerNode(object):
                                     self._track_ids.last_id)
         self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=10)
         self._markers_pub = rospy.Publisher(MARKERS_TOPIC, MarkerArray, queue_size=10)
-        for camera_name in self._stage.camera_names:
+        for camera_name in self._stage.views:
             self._subscribe(camera_name, params, part.subscribes)
         self._uses_depth = params.use_depth
         if params.use_map:
@@ -103,15 +103,15 @@ class TrackerNode(object):
 
     def _on_camera_info(self, message, camera_name):
         with self._diagnostics.receiving('camera_info'):
-            self._stage.add_camera_info(message, camera_name)
+            self._stage.views[camera_name].add_camera_info(message)
 
     def _on_depth_camera_info(self, message, camera_name):
         with self._diagnostics.receiving('camera_info of depth'):
-            self._stage.add_depth_camera_info(message, camera_name)
+            self._stage.views[camera_name].add_depth_camera_info(message)
 
     def _on_depth(self, message, camera_name):
         with self._diagnostics.receiving('depth images'):
-            self._stage.add_depth(message, arrival_clock_ns(), camera_name)
+            self._stage.views[camera_name].add_depth(message, arrival_clock_ns())
 
     def on_frame(self, message, depth_msg):
         """Process the 3D boxes and the depth image of a frame."""

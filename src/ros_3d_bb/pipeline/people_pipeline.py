@@ -116,16 +116,16 @@ class PeoplePipeline(object):
     def take(self, topic, message, now_ns, camera_name=''):
         """Process a message on one of the `INPUTS` except tf, which arrived at `now_ns`. Raises ValueError."""
         self._now_ns = now_ns
-        source, tracking_stage = self._cameras[camera_name].source, self._tracking_stage
+        source, views = self._cameras[camera_name].source, self._tracking_stage.views[camera_name]
         if topic in INFO_TOPICS:
             images = COLOR_INFO_IMAGES[self._settings.bbox3d[0].depth] if topic == INFO_TOPIC else DEPTH_TOPIC
             message = info_of_images(message, self._settings.name(images, camera_name))
         if topic == INFO_TOPIC:
-            tracking_stage.add_camera_info(message, camera_name)
+            views.add_camera_info(message)
             source.add_camera_info(message, now_ns)
         elif topic == DEPTH_INFO_TOPIC:
             if self._settings.tracker[0].use_depth:
-                tracking_stage.add_depth_camera_info(message, camera_name)
+                views.add_depth_camera_info(message)
             source.add_depth_camera_info(message, now_ns)
         elif topic == DEPTH_TOPIC:
             source.add_depth(message, now_ns)
@@ -182,7 +182,7 @@ class PeoplePipeline(object):
     def _on_boxes3d(self, camera_name, message, _boxes3d, _frame, depth_msg):
         self._results.append((topic_of(camera_name, BOXES3D_TOPIC), message))
         if self._settings.tracker[0].use_depth:
-            self._tracking_stage.add_depth(depth_msg, self._now_ns, camera_name)
+            self._tracking_stage.views[camera_name].add_depth(depth_msg, self._now_ns)
         with self._events.rejecting('3D boxes'):
             self._tracking_stage.add_boxes(message, self._now_ns, camera_name)
 

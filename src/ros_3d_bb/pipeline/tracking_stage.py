@@ -1,35 +1,28 @@
 """Tracking stage: tracks from 3D boxes and transforms, shared by tracker_node and process_bag."""
 import collections
-import functools
 import re
 import threading
 from typing import NamedTuple
 
-import numpy as np
 import tf2_ros
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.alignment import POSE, target_frame_fault, viewing_fault
-from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, RAW, topic_of
-from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
-from ros_3d_bb.conversions.perception_msgs import (camera_from_msg, occupied_from_msg, stamp_of, time_from,
-                                                   usable_boxes3d)
+from ros_3d_bb.conversions.perception_msgs import stamp_of, time_from, usable_boxes3d
 from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.object_classes import read_object_classes
 from ros_3d_bb.core.params import (CLASSES_FILE, DEPTH, DEPTH_SCALE, SET_BY_LAUNCH, STAMP_TOLERANCE, NestedList, Param,
                                    parameters)
-from ros_3d_bb.core.time_sync import JITTER, NS, CameraClocks, MessageCache, median_period_ns
+from ros_3d_bb.core.time_sync import JITTER, NS, CameraClocks, median_period_ns
 from ros_3d_bb.estimation.error_model import error_model_of_param
-from ros_3d_bb.pipeline.depth_registration import DepthRegistration
+from ros_3d_bb.pipeline.camera_views import CameraViews
+from ros_3d_bb.pipeline.ignored_places import IgnoredPlaces, areas_of
 from ros_3d_bb.pipeline.tracking_frame import AUTO, TrackingFrame, transformed
-from ros_3d_bb.tracking.ignored_areas import IgnoredAreas, polygons_from
 from ros_3d_bb.tracking.manoeuvres import LONGEST_NS
 from ros_3d_bb.tracking.measurement_model import NoiseParams
-from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.track import PredictionParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
-from ros_3d_bb.tracking.types import CameraView, detections_from_boxes
+from ros_3d_bb.tracking.types import detections_from_boxes
 
 TRACKING_PARAMS = TrackerParams, NoiseParams, PredictionParams
 AHEAD, BEHIND = 'images ahead of other cameras', 'images behind other cameras'  # counters
@@ -77,24 +70,24 @@ class TrackerNodeParams(NamedTuple):
 class TrackingStage(object):
     """Track 3D boxes in the frame of a `tracking_frame.TrackingFrame`, and convert the tracks to ~target_frame.
 
-    If there is no transform at the stamp of the boxes, there is no result and tracks do not age. Each message is passed
-    with the namespace of its camera, '' for a single one; boxes and depth images also with their arrival time `now_ns`
-    (integer nanoseconds) on a clock chosen by the caller. The methods are thread-safe. The constructor and
-    `reconfigure` raise ValueError if a parameter is invalid.
+    If there is no transform at the stamp of the boxes, there is no result and tracks do not age. The name of a camera
+    is its namespace, '' for a single one. Boxes and depth images are passed with their arrival time `now_ns` (integer
+    nanoseconds) on a clock chosen by the caller. The methods are thread-safe. The constructor and `reconfigure` raise
+    ValueError if a parameter is invalid.
 
     `tracking` has one instance of each of `TRACKING_PARAMS`. The method `lookup(target_frame, source_frame, stamp)` of
     `transforms` returns target_from_source (4, 4) or raises tf2_ros.TransformException. `on_tracks` is called with the
     tracks (list of `types.TrackedObject`) after each image and their header, which has the newest stamp and the target
     frame; `lock` is held meanwhile. The IDs of tracks are greater than `last_id`.
 
-    Attributes: `cameras`, the namespaces of the cameras; and `lock`.
+    Attributes: `views`, the `camera_views.CameraViews` of each camera, by its name; and `lock`.
     """
 
     def __init__(self, params, tracking, events, transforms, on_tracks, last_id=0):
         _check(params)
         params = params._replace(target_frame=params.target_frame.lstrip('/'))  # tf2 rejects frames with a slash
         self._params, self._events, self._on_tracks = params, events, on_tracks
-        self.camera_names = tuple(params.cameras) or ('',)
+        self.views = {name: CameraViews(params, events, transforms, name) for name in params.cameras or ('',)}
         self._classes = read_object_classes(params.classes_file)
         model = error_model_of_param(params.error_model)
         self._tracker = Tracker(*tracking, last_id=last_id, classes=self._classes,
@@ -103,76 +96,48 @@ class TrackingStage(object):
         self._clocks = CameraClocks()
         self._jumps = 0  # number of backward jumps in time
         self._boxes_ns = {}  # newest stamp of tracked boxes, by camera
-        self._recent_ns = {name: collections.deque(maxlen=RECENT) for name in self.camera_names}  # stamps of boxes
-        self._frames, self._intrinsics = {}, {}  # by camera
+        self._recent_ns = {name: collections.deque(maxlen=RECENT) for name in self.views}  # stamps of boxes
+        self._frames = {}  # by camera
         self._frame = TrackingFrame(transforms, params.tracking_frame, params.target_frame)
-        self._areas = _areas_of(params)
+        self._ignored = IgnoredPlaces(params, events)
         self._poses = {}  # latest CameraPose, by camera
         self._newest_pose = None
-        self._depths = {name: MessageCache(int(params.depth_cache_length * NS)) for name in self.camera_names}
-        self._registrations = {name: DepthRegistration(transforms, topic_of(name, DEPTH_TOPICS[RAW][1]))
-                               for name in self.camera_names if params.depth == RAW}
 
     def reconfigure(self, params, tracking):
         """Use other tracking parameters and ignored areas for the next boxes; tracks are kept, except those in other
         areas than before. Raises ValueError as the constructor, without any change."""
-        areas = _areas_of(params)._replace(occupied=self._areas.occupied)
+        areas = areas_of(params)
         with self.lock:
             self._tracker.reconfigure(*tracking)
-            if areas.differs_from(self._areas):
-                self._ignore(areas)
+            if self._ignored.use(areas):
+                self._end_ignored()
 
     @property
     def ignored_areas(self):
         """Polygons, arrays (n, 2) in the target frame, in which no track starts."""
-        return self._areas.polygons
+        return self._ignored.polygons_m
 
     @property
     def views_m(self):
         """Outlines, arrays (3, 2) in the target frame, of the fields of view of the cameras."""
-        return [CameraView(pose.target_from_camera, self._intrinsics[name]).outline(SHOWN_RANGE_M)
-                for name, pose in sorted(self._poses.items()) if name in self._intrinsics]
+        outlines_m = (self.views[name].outline_m(pose.target_from_camera, SHOWN_RANGE_M)
+                      for name, pose in sorted(self._poses.items()))
+        return [outline_m for outline_m in outlines_m if outline_m is not None]
 
     def set_map(self, message):
         """Start no tracks in the occupied cells of a nav_msgs/OccupancyGrid. With the first one, those there end.
 
         Raises ValueError if it is in another frame than the published tracks.
         """
-        if message.header.frame_id.lstrip('/') != self._params.target_frame:
-            raise ValueError('its frame is %r, and that of the tracks %r; the same expected, and no cells are ignored'
-                             % (message.header.frame_id, self._params.target_frame))
-        areas = self._areas._replace(occupied=occupied_from_msg(message))
+        cells = self._ignored.cells_of(message)
         with self.lock:
-            if self._areas.occupied is None:
-                self._ignore(areas)
-            self._areas = areas
+            if self._ignored.use_map(cells):
+                self._end_ignored()
 
-    def _ignore(self, areas):
-        """Use other IgnoredAreas. The tracks in them, which have started there, end."""
-        self._areas = areas
-        if self._newest_pose is None:
-            return
-        cameras_m = [pose.target_from_camera[:2, 3] for pose in self._poses.values()]
-
-        def is_ignored(place_m):
-            point_m, = self._newest_pose.in_target(np.array([place_m + (0.0,)]))
-            return any(areas.contains(point_m, camera_m) for camera_m in cameras_m)
-        self._tracker.delete_at(is_ignored)
-
-    def add_camera_info(self, message, camera_name=''):
-        """Add a sensor_msgs/CameraInfo. Raises ValueError if it is invalid."""
-        self._intrinsics[camera_name] = camera_from_msg(message)
-
-    def add_depth_camera_info(self, message, camera_name=''):
-        """Add a sensor_msgs/CameraInfo of the depth camera, for raw depth. Raises ValueError if it is invalid."""
-        self._registrations[camera_name].add_camera_info(message)
-
-    def add_depth(self, message, now_ns, camera_name=''):
-        """Add a depth image. Raises ValueError if it has no stamp; if it is invalid otherwise, it is counted."""
-        stamp_ns = stamp_of(message)
-        with self._events.rejecting('depth images'):
-            depth = imgmsg_to_depth(message, self._params.depth_scale)
-            self._depths[camera_name].add(stamp_ns, now_ns, (depth, message.header.frame_id))
+    def _end_ignored(self):
+        """End the tracks in ignored places, which have started there."""
+        if self._newest_pose is not None:
+            self._tracker.delete_at(self._ignored.seen_from(self._poses.values(), self._newest_pose))
 
     def add_boxes(self, message, now_ns, camera_name=''):
         """Process a BoundingBox3DArray: `on_tracks` is called unless the transform is missing, or the stamp is
@@ -219,14 +184,14 @@ class TrackingStage(object):
         if camera_name:
             self._check_frame(message.header.frame_id, camera_name)
         untracked_boxes = self._tracker.untracked_boxes
-        detections = self._without_ignored(detections_from_boxes(boxes, pose.tracking_from_camera, self._classes), pose)
-        tracks = self._tracker.update(stamp_ns, detections,
-                                      self._view(message.header, pose.tracking_from_camera, camera_name))
+        detections = detections_from_boxes(boxes, pose.tracking_from_camera, self._classes)
+        view = self.views[camera_name].view(message.header, pose.tracking_from_camera)
+        tracks = self._tracker.update(stamp_ns, self._ignored.marked(detections, pose), view)
         self._events.count('images tracked')
         untracked_boxes = self._tracker.untracked_boxes - untracked_boxes
         if untracked_boxes > 0:
             self._events.count('3D boxes that became no track', untracked_boxes)
-        if len(self.camera_names) > 1 and CONTRADICTION not in self._events.counts:
+        if len(self.views) > 1 and CONTRADICTION not in self._events.counts:
             contradicting = self._tracker.contradicting_cameras
             if contradicting:
                 self._events.warn(CONTRADICTION, '%s and %s each detect another one of two tracks nearby, as if they '
@@ -246,18 +211,6 @@ class TrackingStage(object):
         self._on_tracks(transformed(tracks, self._newest_pose.target_from_tracking),
                         Header(stamp=time_from(newest_ns), frame_id=self._params.target_frame))
 
-    def _without_ignored(self, detections, pose):
-        """Detections in the tracking frame, marked if they start no track."""
-        areas = self._areas
-        if not detections or not areas.polygons and areas.occupied is None:
-            return detections
-        camera_m = pose.target_from_camera[:2, 3]
-        places_m = pose.in_target(np.array([detection.position_m for detection in detections]))
-        detections = [detection._replace(is_ignored=areas.contains(place_m, camera_m))
-                      for detection, place_m in zip(detections, places_m)]
-        self._events.count('boxes in ignored areas', sum(detection.is_ignored for detection in detections))
-        return detections
-
     def _check_rate(self, stamp_ns, camera_name):
         """Report images so far apart that the tracker assigns no boxes of people who move."""
         recent_ns = self._recent_ns[camera_name]
@@ -270,32 +223,8 @@ class TrackingStage(object):
     def _silent_cameras(self, newest_ns):
         """Names of the cameras whose newest boxes are older than ~camera_timeout."""
         timeout_s = self._params.camera_timeout or float('inf')
-        return [name for name in self.camera_names
+        return [name for name in self.views
                 if newest_ns - self._boxes_ns.get(name, float('-inf')) > timeout_s * NS]
-
-    def _view(self, header, tracking_from_camera, camera_name):
-        """Return the CameraView of boxes with this header, with intrinsics and depth if they are known."""
-        view = CameraView(tracking_from_camera, self._intrinsics.get(camera_name), camera_name)
-        entry = self._depths[camera_name].matching(header.stamp.to_nsec(), int(self._params.stamp_tolerance * NS))
-        if view.intrinsics is None or entry is None:
-            return view
-        return self._with_depth(view, *entry.value, camera_name, header.frame_id)
-
-    def _with_depth(self, view, depth, depth_frame, camera_name, boxes_frame):
-        """Return a CameraView with a depth image; without one that cannot be used, which bbox3d_node reports."""
-        intrinsics = view.intrinsics
-        if camera_name not in self._registrations:
-            if depth.values.shape != (intrinsics.height, intrinsics.width):
-                return view
-            return view._replace(depth_at=functools.partial(depths_towards, intrinsics, depth),
-                                 measured_area=depth.measured_area)
-        try:
-            geometry = self._registrations[camera_name].geometry(depth, depth_frame, intrinsics,
-                                                                 self._params.camera_frame or boxes_frame)
-        except ValueError:
-            return view
-        return view._replace(depth_at=functools.partial(_depths_from_beside, geometry, depth),
-                             measured_area=lambda: geometry.area_px)
 
     def _accept(self, stamp_ns, now_ns, camera_name):
         """Whether the stamp of boxes is consistent with those of the other cameras. Handles backward jumps in time, as
@@ -321,23 +250,11 @@ class TrackingStage(object):
         if self._frames.get(camera_name) == frame_id:
             return
         self._frames[camera_name] = frame_id
-        cameras = [other for other in self.camera_names if self._frames.get(other) == frame_id]
-        if len(cameras) > 1:
+        sharing = [name for name in self.views if self._frames.get(name) == frame_id]
+        if len(sharing) > 1:
             self._events.note('cameras sharing a frame', 'the boxes of %s are all in the frame %s and are tracked as '
                               'if the cameras had the same pose; each camera needs its own frame'
-                              % (' and '.join(cameras), frame_id))
-
-
-def _depths_from_beside(geometry, depth, points):
-    """As `depths_towards`, for raw depth: measured towards the points from the depth camera beside the view."""
-    points_there = transform_points(np.linalg.inv(geometry.color_from_depth), points)
-    share = depths_towards(geometry.depth_camera, depth, points_there) / points_there[:, 2]
-    beside_m = geometry.color_from_depth[2, 3]
-    return beside_m + share * (points[:, 2] - beside_m)
-
-
-def _areas_of(params):
-    return IgnoredAreas(polygons_from(params.ignored_areas), None, params.map_depth)
+                              % (' and '.join(sharing), frame_id))
 
 
 def _check(params):
