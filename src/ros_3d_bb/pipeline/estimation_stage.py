@@ -12,12 +12,11 @@ from ros_3d_bb.core.params import (CLASSES_FILE, DEPTH, DEPTH_SCALE, IMAGE_ROTAT
                                    parameters)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.appearance import appearance_of
-from ros_3d_bb.estimation.box3d import REASONS, Rejected
+from ros_3d_bb.estimation.box3d import Rejected
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, error_model_of_param
 
 APPEARANCE_NS = NS // 10  # chosen: at 30 Hz, colours would take nearly as long as positions (0.25 of 0.31 ms a person)
-REJECTIONS = REASONS  # events of 2D boxes without a 3D box
 # Check of the scale of depth images.
 LATEST_PEOPLE = 20  # people that must agree
 LEAST_SUPPORT = 0.3  # boxes with less are often those of other objects
