@@ -14,8 +14,8 @@ class NestedList(str):
     and JSON. A file may also contain the list itself."""
 
 
-class Param(NamedTuple):
-    """Schema of one parameter, given as the default of a field of a NamedTuple."""
+class ParamSchema(NamedTuple):
+    """Schema of one parameter, given as the default of a field of a NamedTuple, under the name `Param`."""
 
     default: Any  # bool, int, float, str or tuple
     text: str = ''  # description in sentences; empty if the `doc=` of the corresponding launch argument describes it
@@ -41,6 +41,7 @@ class Param(NamedTuple):
         return ' '.join(filter(None, (unit, allowed, live)))
 
 
+Param: Any = ParamSchema  # for type checkers: of the type of the field
 SET_BY_LAUNCH = 'Set by launch files'
 # Shared by several nodes.
 DEPTH_SCALE = Param(
@@ -78,7 +79,7 @@ def parameters(section: str = '') -> Callable[[Any], Any]:
     return decorate
 
 
-def table_of(kinds: Iterable[Any]) -> Dict[str, Param]:
+def table_of(kinds: Iterable[Any]) -> Dict[str, ParamSchema]:
     """Merge the schemas of several types into one table, {name: Param}; shared names appear once."""
     return {name: kind.PARAMS[name] for kind in kinds for name in kind._fields}
 

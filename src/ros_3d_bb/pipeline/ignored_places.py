@@ -6,7 +6,7 @@ from nav_msgs.msg import OccupancyGrid
 
 from ros_3d_bb.conversions.perception_msgs import occupied_from_msg
 from ros_3d_bb.core.event_counter import EventCounter
-from ros_3d_bb.pipeline.tracking_frame import CameraPose
+from ros_3d_bb.pipeline.tracking_frame import ImagePose
 from ros_3d_bb.tracking.ignored_areas import IgnoredAreas, OccupiedCells, polygons_from
 from ros_3d_bb.tracking.types import Detection
 
@@ -39,7 +39,7 @@ class IgnoredPlaces(object):
                              % (message.header.frame_id, self._target_frame))
         return occupied_from_msg(message)
 
-    def marked(self, detections: List[Detection], pose: CameraPose) -> List[Detection]:
+    def marked(self, detections: List[Detection], pose: ImagePose) -> List[Detection]:
         """Detections in the tracking frame, marked if they start no track."""
         areas = self._areas
         if not detections or not areas.polygons and areas.occupied is None:
@@ -51,7 +51,7 @@ class IgnoredPlaces(object):
         self._events.count('boxes in ignored areas', sum(detection.is_ignored for detection in detections))
         return detections
 
-    def seen_from(self, poses: Iterable[CameraPose], newest: CameraPose) -> Callable[[Any], bool]:
+    def seen_from(self, poses: Iterable[ImagePose], newest: ImagePose) -> Callable[[Any], bool]:
         """Function that returns whether a place (x, y) of the tracking frame is ignored, given the poses of the cameras
         and the newest one."""
         areas, cameras_m = self._areas, [pose.target_from_camera[:2, 3] for pose in poses]

@@ -2,14 +2,17 @@
 import collections
 import re
 import threading
-from typing import NamedTuple
+from typing import Any, Callable, Deque, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
+import numpy as np
 import tf2_ros
+from nav_msgs.msg import OccupancyGrid
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.alignment import POSE, target_frame_fault, viewing_fault
 from ros_3d_bb.conversions.perception_msgs import stamp_of, time_from, usable_boxes3d
 from ros_3d_bb.core.detector_model import DetectorModel
+from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.object_classes import read_object_classes
 from ros_3d_bb.core.params import (CLASSES_FILE, DEPTH, DEPTH_SCALE, SET_BY_LAUNCH, STAMP_TOLERANCE, NestedList, Param,
                                    parameters)
@@ -17,14 +20,16 @@ from ros_3d_bb.core.time_sync import JITTER, NS, CameraClocks, median_period_ns
 from ros_3d_bb.estimation.error_model import error_model_of_param
 from ros_3d_bb.pipeline.camera_views import CameraViews
 from ros_3d_bb.pipeline.ignored_places import IgnoredPlaces, areas_of
-from ros_3d_bb.pipeline.tracking_frame import AUTO, TrackingFrame, transformed
+from ros_3d_bb.pipeline.tracking_frame import AUTO, ImagePose, TrackingFrame, transformed
+from ros_3d_bb.pipeline.transform_buffer import TransformBuffer
 from ros_3d_bb.tracking.manoeuvres import LONGEST_NS
 from ros_3d_bb.tracking.measurement_model import NoiseParams
 from ros_3d_bb.tracking.track import PredictionParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
-from ros_3d_bb.tracking.types import detections_from_boxes
+from ros_3d_bb.tracking.types import TrackedObject, detections_from_boxes
 
 TRACKING_PARAMS = TrackerParams, NoiseParams, PredictionParams
+TrackingParams = Tuple[TrackerParams, NoiseParams, PredictionParams]
 AHEAD, BEHIND = 'images ahead of other cameras', 'images behind other cameras'  # counters
 CONTRADICTION = 'cameras that contradict each other'  # event, reported once
 TOO_SLOW = 'rate of images too low'  # event, reported once
@@ -83,7 +88,9 @@ class TrackingStage(object):
     Attributes: `views`, the `camera_views.CameraViews` of each camera, by its name; and `lock`.
     """
 
-    def __init__(self, params, tracking, events, transforms, on_tracks, last_id=0):
+    def __init__(self, params: TrackerNodeParams, tracking: TrackingParams, events: EventCounter,
+                 transforms: TransformBuffer, on_tracks: Callable[[List[TrackedObject], Header], Any],
+                 last_id: int = 0) -> None:
         _check(params)
         params = params._replace(target_frame=params.target_frame.lstrip('/'))  # tf2 rejects frames with a slash
         self._params, self._events, self._on_tracks = params, events, on_tracks
@@ -95,15 +102,16 @@ class TrackingStage(object):
         self.lock = threading.RLock()
         self._clocks = CameraClocks()
         self._jumps = 0  # number of backward jumps in time
-        self._boxes_ns = {}  # newest stamp of tracked boxes, by camera
-        self._recent_ns = {name: collections.deque(maxlen=RECENT) for name in self.views}  # stamps of boxes
-        self._frames = {}  # by camera
+        self._boxes_ns: Dict[str, int] = {}  # newest stamp of tracked boxes, by camera
+        self._recent_ns: Dict[str, Deque[int]] = {  # stamps of boxes
+            name: collections.deque(maxlen=RECENT) for name in self.views}
+        self._frames: Dict[str, str] = {}  # by camera
         self._frame = TrackingFrame(transforms, params.tracking_frame, params.target_frame)
         self._ignored = IgnoredPlaces(params, events)
-        self._poses = {}  # latest CameraPose, by camera
-        self._newest_pose = None
+        self._poses: Dict[str, ImagePose] = {}  # latest one, by camera
+        self._newest_pose: Optional[ImagePose] = None
 
-    def reconfigure(self, params, tracking):
+    def reconfigure(self, params: TrackerNodeParams, tracking: TrackingParams) -> None:
         """Use other tracking parameters and ignored areas for the next boxes; tracks are kept, except those in other
         areas than before. Raises ValueError as the constructor, without any change."""
         areas = areas_of(params)
@@ -113,18 +121,18 @@ class TrackingStage(object):
                 self._end_ignored()
 
     @property
-    def ignored_areas(self):
+    def ignored_areas(self) -> Sequence[np.ndarray]:
         """Polygons, arrays (n, 2) in the target frame, in which no track starts."""
         return self._ignored.polygons_m
 
     @property
-    def views_m(self):
+    def views_m(self) -> List[np.ndarray]:
         """Outlines, arrays (3, 2) in the target frame, of the fields of view of the cameras."""
         outlines_m = (self.views[name].outline_m(pose.target_from_camera, SHOWN_RANGE_M)
                       for name, pose in sorted(self._poses.items()))
         return [outline_m for outline_m in outlines_m if outline_m is not None]
 
-    def set_map(self, message):
+    def set_map(self, message: OccupancyGrid) -> None:
         """Start no tracks in the occupied cells of a nav_msgs/OccupancyGrid. With the first one, those there end.
 
         Raises ValueError if it is in another frame than the published tracks.
@@ -134,12 +142,12 @@ class TrackingStage(object):
             if self._ignored.use_map(cells):
                 self._end_ignored()
 
-    def _end_ignored(self):
+    def _end_ignored(self) -> None:
         """End the tracks in ignored places, which have started there."""
         if self._newest_pose is not None:
             self._tracker.delete_at(self._ignored.seen_from(self._poses.values(), self._newest_pose))
 
-    def add_boxes(self, message, now_ns, camera_name=''):
+    def add_boxes(self, message: Any, now_ns: int, camera_name: str = '') -> None:
         """Process a BoundingBox3DArray: `on_tracks` is called unless the transform is missing, or the stamp is
         inconsistent with those of the other cameras. Raises ValueError if the message or each of its boxes is invalid,
         or the boxes are in the fixed frame.
@@ -170,7 +178,7 @@ class TrackingStage(object):
                 self._events.warn(BEHIND, 'boxes at %.3f are dropped: time jumped back while their transform was '
                                   'awaited' % (stamp_ns / NS))
 
-    def _track(self, message, stamp_ns, pose, camera_name):
+    def _track(self, message: Any, stamp_ns: int, pose: ImagePose, camera_name: str) -> None:
         fault = viewing_fault(self._params.camera_frame or message.header.frame_id, pose.target_from_camera)
         if fault:
             self._tracker.skip(stamp_ns, camera_name)
@@ -199,7 +207,7 @@ class TrackingStage(object):
                                   % contradicting)
         newest_ns = self._clocks.track(stamp_ns, camera_name)
         self._boxes_ns[camera_name], self._poses[camera_name] = stamp_ns, pose
-        if stamp_ns == newest_ns:
+        if stamp_ns == newest_ns or self._newest_pose is None:
             self._newest_pose = pose
         self._check_rate(stamp_ns, camera_name)
         silent = self._silent_cameras(newest_ns)
@@ -211,7 +219,7 @@ class TrackingStage(object):
         self._on_tracks(transformed(tracks, self._newest_pose.target_from_tracking),
                         Header(stamp=time_from(newest_ns), frame_id=self._params.target_frame))
 
-    def _check_rate(self, stamp_ns, camera_name):
+    def _check_rate(self, stamp_ns: int, camera_name: str) -> None:
         """Report images so far apart that the tracker assigns no boxes of people who move."""
         recent_ns = self._recent_ns[camera_name]
         recent_ns.append(stamp_ns)
@@ -220,32 +228,32 @@ class TrackingStage(object):
             self._events.warn(TOO_SLOW, '3D boxes arrive every %.2f s; less than %g s expected, or walking people are '
                               'not tracked; choose a faster detector' % (period_ns / NS, LONGEST_NS / NS))
 
-    def _silent_cameras(self, newest_ns):
+    def _silent_cameras(self, newest_ns: int) -> List[str]:
         """Names of the cameras whose newest boxes are older than ~camera_timeout."""
         timeout_s = self._params.camera_timeout or float('inf')
         return [name for name in self.views
                 if newest_ns - self._boxes_ns.get(name, float('-inf')) > timeout_s * NS]
 
-    def _accept(self, stamp_ns, now_ns, camera_name):
+    def _accept(self, stamp_ns: int, now_ns: int, camera_name: str) -> bool:
         """Whether the stamp of boxes is consistent with those of the other cameras. Handles backward jumps in time, as
         when a bag is looped or rewound: tracks are discarded."""
         trusted = self._clocks.accept(stamp_ns, now_ns, camera_name)
+        newest_ns = self._clocks.newest_ns or stamp_ns
         if trusted is not None:
-            newest_ns = self._clocks.newest_ns or stamp_ns
             self._events.warn(AHEAD if stamp_ns > newest_ns else BEHIND, 'boxes of %s at %.3f are dropped: their stamp '
                               'is %.3f s from the newest one, and %s has the correct time; they are tracked once that '
                               'camera agrees or ends'
                               % (camera_name, stamp_ns / NS, (stamp_ns - newest_ns) / NS, trusted))
         elif self._clocks.is_jump_back(stamp_ns, now_ns, camera_name):
             self._events.note('jumps back in time', 'time jumped back from %.3f to %.3f: earlier tracks are discarded'
-                              % (self._clocks.newest_ns / NS, stamp_ns / NS))
+                              % (newest_ns / NS, stamp_ns / NS))
             self._tracker.reset()
             self._clocks.restart()
             self._boxes_ns.clear()
             self._jumps += 1
         return trusted is None
 
-    def _check_frame(self, frame_id, camera_name):
+    def _check_frame(self, frame_id: str, camera_name: str) -> None:
         """Report cameras that share a frame, because tf then gives them the same position."""
         if self._frames.get(camera_name) == frame_id:
             return
@@ -257,7 +265,7 @@ class TrackingStage(object):
                               % (' and '.join(sharing), frame_id))
 
 
-def _check(params):
+def _check(params: TrackerNodeParams) -> None:
     if not params.target_frame:
         raise ValueError('parameter ~target_frame is empty; map or odom expected')
     fault = target_frame_fault(params.target_frame, params.camera_frame)
