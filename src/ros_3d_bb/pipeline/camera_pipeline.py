@@ -1,7 +1,6 @@
 """The chain from the images of one camera to 3D boxes, for the nodes and for bags."""
 from typing import Any, Callable, List, Optional, Tuple
 
-import numpy as np
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray
 
@@ -47,7 +46,7 @@ class CameraPipeline(object):
             self._estimate_in(trigger, frame, depth_msg)
 
     def detect(self, color_msg: Image, depth_msg: Image,
-               camera: Camera) -> Optional[Tuple[np.ndarray, Detections, RgbdFrame, Image]]:
+               camera: Camera) -> Optional[Tuple[Any, Detections, RgbdFrame, Image]]:
         """Return the RGB image of matched messages and its Detections, followed by the arguments with which `estimate`
         continues; None while the floor is unknown. Raises ValueError as `RgbdSource.frame`."""
         frame, depth_msg = self._frame(color_msg, depth_msg, camera)
