@@ -1,4 +1,4 @@
-"""Nodes in this process without a master: their subscribers, publishers and tf buffers are replaced by recording ones.
+"""Nodes in this process without a master: their subscribers and publishers are replaced by recording ones.
 
 Only the connections of rospy and tf2 are replaced; the nodes and their callbacks are the real ones. Published messages
 are serialized, as by rospy; so are the messages that are sent to them (see `on_the_wire`).
@@ -9,8 +9,6 @@ from unittest import mock
 
 import genpy
 import rosbag
-
-from ros_3d_bb.pipeline.transform_buffer import TransformBuffer
 
 
 def on_the_wire(message):
@@ -48,7 +46,7 @@ class Connections(object):
 
     def __init__(self):
         self.publishers, self.subscribers = {}, {}  # by topic
-        self.services, self.buffers = {}, []  # types by name, and tf buffers
+        self.services = {}  # types by name
         self.timers = []  # (period in seconds, callback)
         self.now = genpy.Time(1)
 
@@ -63,10 +61,6 @@ class Connections(object):
     def _subscriber(self, topic, kind, callback, **_options):
         self.subscribers[topic] = mock.Mock(topic=topic, kind=kind, callback=callback, resolved_name='/' + topic)
         return self.subscribers[topic]
-
-    def _buffer(self):
-        self.buffers.append(TransformBuffer())
-        return self.buffers[-1]
 
 
 @contextlib.contextmanager
@@ -84,7 +78,6 @@ def masterless(params=(), names=()):
         'rospy.resolve_name': lambda name: dict(names).get(name, '/' + name), 'rospy.is_shutdown': lambda: False,
         'rospy.get_rostime': lambda: connections.now, 'rospy.rostime.get_rostime': lambda: connections.now,
         'rospy.logwarn_throttle': lambda _period_s, text, *arguments: text % arguments,
-        'ros_3d_bb.nodes.common.tf_lookup.TransformBuffer': connections._buffer,
         'ros_3d_bb.nodes.common.subscribers._inputs': [],
         'ros_3d_bb.nodes.common.diagnostics.Diagnostics._run': mock.Mock(),
         'ros_3d_bb.nodes.common.detector_output.NewestWorker': immediate_worker,

@@ -29,7 +29,8 @@ ALLOWED = {
     'ros_3d_bb.pipeline': (
         'camera conversions core detection detection.depth detection.yolov5 estimation tracking visualization',
         'messages tf2_ros'),
-    'ros_3d_bb.bags': ('camera conversions core detection.yolov5 pipeline sessions', 'messages rosbag tf2_ros yaml'),
+    'ros_3d_bb.bags': (
+        'camera conversions core detection.yolov5 estimation pipeline sessions', 'messages rosbag tf2_ros yaml'),
     'ros_3d_bb.diagnosis': ('bags camera conversions core detection.depth msg pipeline', 'messages tf2_ros yaml'),
     'ros_3d_bb.nodes.common': ('camera conversions core diagnosis msg pipeline planning visualization', 'ros'),
     'ros_3d_bb.nodes': (

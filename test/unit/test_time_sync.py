@@ -21,11 +21,11 @@ class Recorder(object):
     def _on_frame(self, boxes, depth, camera):
         self.frames.append((boxes.value, depth.value, camera))
 
-    def _on_lost(self, boxes, before_jump):
+    def _on_lost(self, boxes, _stamp_ns, before_jump):
         if before_jump:
-            self.dropped.append(boxes.value)
+            self.dropped.append(boxes)
         else:
-            self.frames.append((boxes.value, None, None))
+            self.frames.append((boxes, None, None))
 
     def add(self, kind, stamp_ns, now_ns, value):
         """Add a depth image, a camera or boxes. Returns the frames that this completed."""

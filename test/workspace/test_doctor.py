@@ -294,7 +294,7 @@ def test_robot10_is_not_robot1():
             mock.patch('rospy.resolve_name', lambda name: '/robot1/' + name), mock.patch('time.sleep') as sleep, \
             mock.patch('ros_3d_bb.nodes.common.graph_observer.published_topics', dict):
         sleep.side_effect = lambda _s: connections.subscribers['/diagnostics'].callback(message)
-        seen = GraphObserver(camera='').observations()
+        seen = GraphObserver(camera_name='').observations()
     assert set(seen.nodes) == {'robot1/bbox3d_node'} and seen.streams['depth'].topic == '/robot1' + DEPTH
 
 

@@ -94,8 +94,13 @@ def test_the_diagnostics_continue_after_a_failed_report():
             mock.patch('rospy.get_rostime', return_value=rospy.Time(1)), mock.patch(path + 'PERIOD_S', 0.01):
         publish = publisher.return_value.publish
         publish.side_effect = [ZeroDivisionError('by nothing')] + 1000 * [None]
-        Diagnostics()
-        wait_until(lambda: publish.call_count >= 3, 'another report')
+
+        def reported(name):
+            return [shown.value for call in publish.call_args_list for shown in call[0][0].status[0].values
+                    if shown.key == name]
+        Diagnostics().record_latency(rospy.Time(0, 200000000))
+        wait_until(lambda: publish.call_count >= 3 and reported('latency'), 'another report')
+    assert reported('latency')[0].startswith('mean 800.0 ms')
     assert 'by nothing' in log.call_args[0][1]
     status, = publish.call_args[0][0].status
     assert (status.name, status.message) == (rospy.get_name()[1:] + ': pipeline', 'no input yet')

@@ -100,8 +100,9 @@ def test_boxes_in_the_frame_of_the_body_of_the_camera_are_rejected(rig):
 def add_images(rig, stamp_ns, encoding='16UC1'):
     """camera_info, and a depth image of a wall 1.5 m ahead."""
     header, depth_mm = Header(stamp=time_from(stamp_ns), frame_id='camera'), np.full((48, 64), 1500, '<u2')
-    rig.add_camera_info(CameraInfo(header=header, width=64, height=48, K=[60, 0, 32, 0, 60, 24, 0, 0, 1]))
-    rig.add_depth(Image(header=header, width=64, height=48, encoding=encoding, step=128, data=depth_mm.tobytes()), 0)
+    rig.views[''].add_camera_info(CameraInfo(header=header, width=64, height=48, K=[60, 0, 32, 0, 60, 24, 0, 0, 1]))
+    image = Image(header=header, width=64, height=48, encoding=encoding, step=128, data=depth_mm.tobytes())
+    rig.views[''].add_depth(image, 0)
 
 
 def test_a_person_behind_something_in_the_depth_image_is_occluded(rig):
@@ -123,13 +124,13 @@ def test_raw_depth_is_compared_from_where_its_camera_stands(monkeypatch, columns
     monkeypatch.setattr(rig.transforms, 'lookup', lambda target, source, stamp: (
         beside if (target, source) == ('camera', 'depth') else lookup(target, source, stamp)))
     stamp_ns, _before = stand(rig)
-    rig.add_depth_camera_info(CameraInfo(width=424, height=240, K=[210, 0, cx, 0, 210, 120, 0, 0, 1]))
-    rig.add_camera_info(CameraInfo(width=64, height=48, K=[60, 0, 32, 0, 60, 24, 0, 0, 1]))
+    rig.views[''].add_depth_camera_info(CameraInfo(width=424, height=240, K=[210, 0, cx, 0, 210, 120, 0, 0, 1]))
+    rig.views[''].add_camera_info(CameraInfo(width=64, height=48, K=[60, 0, 32, 0, 60, 24, 0, 0, 1]))
     depth_mm = np.full((240, 424), 4000, np.uint16)
     depth_mm[:, slice(*columns)] = 1500
     for number in range(1, 31):
         header = Header(stamp=time_from(stamp_ns + number * PERIOD_NS), frame_id='depth')
-        rig.add_depth(fill_image(Image(header=header), depth_mm, '16UC1'), 0)
+        rig.views[''].add_depth(fill_image(Image(header=header), depth_mm, '16UC1'), 0)
         result = rig.send(stamp_ns + number * PERIOD_NS, count=0)
     assert [track.status for track in result.tracks] == expected
 

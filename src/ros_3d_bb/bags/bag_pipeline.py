@@ -47,9 +47,9 @@ class BagRun(object):
         needed = BOXES_TOPIC if settings.detector == 'none' else COLOR_TOPIC
         self._ahead_ns = int(settings.tracker[0].tf_timeout * NS)
         self._topics = {settings.name(topic): (topic, '') for topic in (TF_TOPIC, STATIC_TOPIC)}
-        for camera in settings.cameras:
+        for camera_name in settings.camera_names:
             for topic in settings.inputs - {TF_TOPIC, STATIC_TOPIC}:
-                self._topics[settings.name(topic, camera)] = topic, camera
+                self._topics[settings.name(topic, camera_name)] = topic, camera_name
         # As in the nodes, the detector has a buffer of its own, because it is ahead of the other stages.
         self._transforms, self._detector_transforms = BagTransforms(), BagTransforms()
         self._unread_tf = collections.deque()  # (time_ns, message) of tf that is not in the buffer yet
@@ -59,9 +59,10 @@ class BagRun(object):
             params, detection, running = settings.yolov5
             self._detector = open_detector(params.weights, detection, running,
                                            lambda line: events.note('remarks of the detector', line))
-            self._rotations = {camera: CameraRotation(params, self._detector_transforms) for camera in settings.cameras}
-        for camera in settings.cameras:
-            reader.check_topic(settings.name(needed, camera), *INPUTS[needed])
+            self._rotations = {name: CameraRotation(params, self._detector_transforms)
+                               for name in settings.camera_names}
+        for camera_name in settings.camera_names:
+            reader.check_topic(settings.name(needed, camera_name), *INPUTS[needed])
 
     def outputs(self):
         """Yield (time, Raw, [(topic, message), ...]): each message of the bag with the messages published by the nodes,
@@ -133,11 +134,11 @@ class BagRun(object):
 
     def _read_depth_cameras(self):
         """Pass the first camera_info of raw depth to the pipeline, which needs it for the first image."""
-        for name, (topic, camera) in self._topics.items():
+        for name, (topic, camera_name) in self._topics.items():
             raw = next(self._reader.messages([name]), None) if topic == DEPTH_INFO_TOPIC else None
             if raw is not None:
                 with self._events.rejecting('messages on %s' % name):
-                    self._pipeline.take(topic, message_in(raw, *INPUTS[topic]), raw.time.to_nsec(), camera)
+                    self._pipeline.take(topic, message_in(raw, *INPUTS[topic]), raw.time.to_nsec(), camera_name)
 
     def _ahead(self, pool):
         """Yield the messages with a delay, to read transforms within ~tf_timeout and images for the detector ahead."""
@@ -156,7 +157,7 @@ class BagRun(object):
 
     def _begun(self, raw, pool):
         """Start the work that can be done ahead of a message's processing: read transforms, submit detections."""
-        topic, camera = self._topics.get(raw.topic, UNUSED)
+        topic, camera_name = self._topics.get(raw.topic, UNUSED)
         if topic == TF_TOPIC:
             with self._events.rejecting('transforms'):
                 message = message_in(raw, TFMessage)
@@ -165,25 +166,25 @@ class BagRun(object):
         elif topic == COLOR_TOPIC and self._detector is not None:
             with self._events.rejecting('images'):
                 image = message_in(raw, *IMAGE_KINDS)
-                turns = self._rotations[camera].turns(image.header.frame_id)
+                turns = self._rotations[camera_name].turns(image.header.frame_id)
                 return Waiting(raw, image, pool.submit(detect_in_color, self._detector, image, turns))
         return Waiting(raw)
 
     def _process(self, waiting):
         raw, image, search = waiting
-        topic, camera = self._topics.get(raw.topic, UNUSED)
+        topic, camera_name = self._topics.get(raw.topic, UNUSED)
         if topic in (None, STATIC_TOPIC):
             return
         now_ns = raw.time.to_nsec()
         self._events.count('messages on %s' % raw.topic)
         if search is not None:
             with self._pipeline.detecting():
-                pixels, detections = search.result()
+                pixels, found = search.result()
                 self._events.count('images processed')
-                self._pipeline.add_detections(image.header, pixels, detections, self._detector.names, now_ns, camera)
+                self._pipeline.add_detections(image.header, pixels, found, self._detector.names, now_ns, camera_name)
         elif topic != TF_TOPIC and (topic != COLOR_TOPIC or self._detector is None):
             with self._events.rejecting('messages on %s' % raw.topic):
-                self._pipeline.take(topic, message_in(raw, *INPUTS[topic]), now_ns, camera)
+                self._pipeline.take(topic, message_in(raw, *INPUTS[topic]), now_ns, camera_name)
 
 
 def process_bag(source, target, settings=Settings()):
@@ -212,7 +213,7 @@ def process_bag(source, target, settings=Settings()):
 def _outputs_of(settings):
     """Return the names of the topics that the pipeline writes."""
     made = set(settings.name(topic) for topic in OUTPUTS)
-    made.update(settings.name(topic, camera) for topic in OUTPUTS_OF_CAMERA for camera in settings.cameras
+    made.update(settings.name(topic, name) for topic in OUTPUTS_OF_CAMERA for name in settings.camera_names
                 if topic != BOXES_TOPIC or settings.detector != 'none')
     return made
 

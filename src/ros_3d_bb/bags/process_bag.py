@@ -13,8 +13,8 @@ from ros_3d_bb.core.atomic_file import clean_up_on_sigterm
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.core.params import IMAGE_ROTATION, nearest_name, params_from, with_places
 from ros_3d_bb.core.yaml_loader import load_yaml
+from ros_3d_bb.estimation.box3d import REASONS
 from ros_3d_bb.pipeline.camera_pose import FLOOR, POSE_FITTED
-from ros_3d_bb.pipeline.estimation_stage import REJECTIONS
 from ros_3d_bb.pipeline.people_pipeline import DETECTORS, INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA, TRACKED, Settings
 
 HIGHEST_M = 100.0
@@ -59,7 +59,7 @@ def _settings_from(given):
             settings = settings._replace(**{node: read_params(path, getattr(settings, node))})
         except (ValueError, OSError, yaml.YAMLError) as error:
             raise ValueError('%s: %s' % (option, error))
-    cameras = given.cameras and [camera.strip() for camera in given.cameras.split(',')]
+    cameras = given.cameras and [name.strip() for name in given.cameras.split(',')]
     for node, name, value in (('yolov5', 'weights', given.weights), ('bbox3d', 'error_model', given.error_model),
                               ('tracker', 'error_model', given.error_model),
                               ('tracker', 'target_frame', given.target_frame), ('tracker', 'cameras', cameras)):
@@ -79,7 +79,7 @@ def _check_names(settings):
     """Raise ValueError if a remapped topic is not one of the nodes with these cameras and this kind of depth."""
     unmapped = settings._replace(names={})
     topics = [unmapped.name(topic)[1:] for topic in OUTPUTS + (TF_TOPIC, STATIC_TOPIC)] + [
-        unmapped.name(topic, camera)[1:] for camera in settings.cameras
+        unmapped.name(topic, name)[1:] for name in settings.camera_names
         for topic in set(INPUTS).union(OUTPUTS_OF_CAMERA) - {TF_TOPIC, STATIC_TOPIC}]
     for ours, theirs in settings.names.items():
         if ours not in topics:
@@ -178,7 +178,7 @@ def _why_no_tracks(events, placed):
         return placed(event)
     if counts.get('images tracked') and counts.get('boxes estimated'):
         return 'none of %d 3D boxes was confirmed by later images' % counts['boxes estimated']
-    rejected = ['%d %s' % (counts[reason], reason) for reason in REJECTIONS if reason in counts]
+    rejected = ['%d %s' % (counts[reason], reason) for reason in REASONS if reason in counts]
     if rejected:
         return 'no 2D box has a 3D position: ' + ', '.join(rejected)
     return ('no people were detected; rosrun ros_3d_bb doctor BAG checks the images and the orientation of the camera '

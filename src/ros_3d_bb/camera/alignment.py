@@ -2,9 +2,12 @@
 
 Each returns a description of the fault, empty without one. `color` and `depth` are `camera_model.Camera`.
 """
+from typing import Optional, Tuple
+
 import numpy as np
 
-from ros_3d_bb.camera.images import FARTHEST_M
+from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.images import FARTHEST_M, DepthImage
 
 LOOKS_UP = 0.85  # z component of a viewing direction from which on it is none, about 60 degrees; chosen
 SAME_PX = 1.0  # intrinsics that differ by less count as equal: half a pixel is 1 cm at 6 m
@@ -24,14 +27,14 @@ MIN_IMAGES, MOVED = 4, 0.01  # images, between which the mean of the edges has m
 MIN_BETTER, MIN_BETTER_STDS = 0.15, 3.0  # how much higher the maximum must be than the share of aligned depth
 
 
-def size_fault(color, width, height):
+def size_fault(color: Camera, width: int, height: int) -> str:
     """Compare the size of a depth image, in pixels, with that of the colour camera."""
     if (width, height) == color[:2]:
         return ''
     return 'the depth image has %d x %d pixels, the colour camera %d x %d' % ((width, height) + color[:2])
 
 
-def info_size_fault(camera, width, height, info_topic):
+def info_size_fault(camera: Camera, width: int, height: int, info_topic: str) -> str:
     """Compare the size of a colour image, in pixels, with that of its camera_info."""
     if (width, height) == camera[:2]:
         return ''
@@ -39,7 +42,7 @@ def info_size_fault(camera, width, height, info_topic):
             'image' % (width, height, info_topic, camera.width, camera.height))
 
 
-def intrinsics_fault(color, depth):
+def intrinsics_fault(color: Camera, depth: Camera) -> str:
     """Compare the intrinsics of both cameras, with the tolerance `SAME_PX`."""
     if color[:2] != depth[:2]:
         return size_fault(color, depth.width, depth.height)
@@ -49,19 +52,19 @@ def intrinsics_fault(color, depth):
     return ''
 
 
-def frames_fault(color_frame, depth_frame):
+def frames_fault(color_frame: str, depth_frame: str) -> str:
     """Compare the frame_ids of both images; an empty one is unknown."""
     if color_frame and depth_frame and color_frame.lstrip('/') != depth_frame.lstrip('/'):
         return 'the depth image is in the frame %s, the colour camera in %s' % (depth_frame, color_frame)
     return ''
 
 
-def is_optical(frame_id):
+def is_optical(frame_id: str) -> bool:
     """Whether a frame is an optical frame by its name (REP 103): its z axis is the viewing direction."""
     return frame_id.endswith('optical_frame')
 
 
-def target_frame_fault(target_frame, camera_frame=''):
+def target_frame_fault(target_frame: str, camera_frame: str = '') -> str:
     """Check that the frame of the tracks is no optical frame: neither by its name nor that of the 3D boxes."""
     target_frame = target_frame.lstrip('/')
     if is_optical(target_frame) or target_frame == camera_frame.lstrip('/'):
@@ -70,7 +73,7 @@ def target_frame_fault(target_frame, camera_frame=''):
     return ''
 
 
-def viewing_fault(camera_frame, target_from_camera):
+def viewing_fault(camera_frame: str, target_from_camera: np.ndarray) -> str:
     """Check the pose (4, 4) of a camera in a frame whose z axis points up: no camera that sees people looks up steeply,
     but the z axis of its body does, if the images have that frame instead of the optical one.
     """
@@ -89,11 +92,11 @@ class EdgeComparison(object):
     one, edges may agree by chance. In a bare room there are no edges, and there is no answer.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._hits = self._count = np.zeros((len(ZOOMS), len(SHIFTS)))
         self._images, self._middle_px = 0, -np.inf
 
-    def add(self, color, depth):
+    def add(self, color: np.ndarray, depth: DepthImage) -> None:
         """Add an RGB image (h, w, 3) and the DepthImage of the same time. Other sizes are ignored."""
         if color.shape[:2] != depth.shape:
             return
@@ -105,7 +108,7 @@ class EdgeComparison(object):
         hits, count = _hits(u[chosen], v[chosen], near_m[chosen], _color_changes(color))
         self._hits, self._count = self._hits + hits, self._count + count
 
-    def fault(self):
+    def fault(self) -> Optional[str]:
         """Return a sentence if the edges of depth and colour disagree, '' if they agree, and None if the images do not
         show it."""
         if self._images < MIN_IMAGES:
@@ -122,7 +125,7 @@ class EdgeComparison(object):
                 '%.0f %% of the image width at 2 m' % (ZOOMS[best_zoom], 100 * SHIFTS[best_shift] / 2))
 
 
-def _depth_edges(depth):
+def _depth_edges(depth: DepthImage) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Columns, rows and nearer depth, metres, of the jumps of depth along some rows; gaps beside them are closed."""
     depth_m = depth.values[ROWS // 2::ROWS].astype(np.float32) * np.float32(depth.scale_m)
     with np.errstate(invalid='ignore'):
@@ -144,7 +147,7 @@ def _depth_edges(depth):
     return (first + last) / 2.0 + SIDE_PX, rows * float(ROWS) + ROWS // 2, near_m[rows, first]
 
 
-def _color_changes(color):
+def _color_changes(color: np.ndarray) -> np.ndarray:
     """Change of green along the rows (h, w), 0..1; saturated, so that strong edges do not prevail."""
     green = color[..., 1].astype(np.int16)
     changes = np.zeros(green.shape, np.float32)
@@ -152,7 +155,7 @@ def _color_changes(color):
     return np.minimum(changes / FULL_CHANGE, 1)
 
 
-def _hits(u, v, near_m, changes):
+def _hits(u: np.ndarray, v: np.ndarray, near_m: np.ndarray, changes: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """Sums of the changes of colour at depth edges, and numbers of edges in the image, for each zoom and shift."""
     height, width = changes.shape
     shifts_px = SHIFTS[:, np.newaxis] * width / near_m

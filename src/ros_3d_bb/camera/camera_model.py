@@ -4,12 +4,13 @@ Convention: pixel (u, v) is the centre of the pixel in column u and row v, both 
 has x right, y down, z forward (REP 103); lengths are in metres. A transform `b_from_a` is a 4x4 matrix that transforms
 points from frame a to frame b.
 """
-from typing import NamedTuple, Tuple
+from typing import Any, NamedTuple, Sequence, Tuple, Union
 
 import numpy as np
 
 from ros_3d_bb.camera.distortion import checked_distortion, distort, undistort
 
+Vector = Union[Sequence[float], np.ndarray]
 OPTICAL_ROTATION = (-0.5, 0.5, -0.5, 0.5)  # quaternion of an optical frame whose z axis is the body's x axis (REP 103)
 
 # Plausible fields of view along the longer side of the image, degrees: RGB-D cameras have 55 (Kinect) to 120 (Azure).
@@ -27,7 +28,8 @@ class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float
 
     __slots__ = ()
 
-    def __new__(cls, width, height, fx, fy, cx, cy, distortion_model='', distortion=()):
+    def __new__(cls, width: float, height: float, fx: float, fy: float, cx: float, cy: float,
+                distortion_model: str = '', distortion: Sequence[float] = ()) -> 'Camera':
         camera = super(Camera, cls).__new__(cls, int(width), int(height), float(fx), float(fy), float(cx), float(cy),
                                             *checked_distortion(distortion_model, distortion))
         if camera.width <= 0 or camera.height <= 0:
@@ -37,7 +39,7 @@ class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float
                              % camera[2:6])
         return camera
 
-    def deproject(self, pixels, depth_m):
+    def deproject(self, pixels: Any, depth_m: Any) -> np.ndarray:
         """Deproject pixels (..., 2) with depths (...), metres, to points (..., 3) in the optical frame (thesis 3.4.1).
 
         x and y are nan for pixels without a ray under the distortion model. Inverse of `project`.
@@ -46,7 +48,7 @@ class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float
         x, y = (along * depth_m for along in self.rays(pixels[..., 0], pixels[..., 1]))
         return np.stack((x, y, np.broadcast_to(depth_m, x.shape)), axis=-1)
 
-    def rays(self, u, v):
+    def rays(self, u: np.ndarray, v: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Viewing rays x / z and y / z of the pixels in columns u and rows v; nan for pixels without a ray.
 
         u and v are arrays that broadcast to one shape: (1, w) and (h, 1), for example, give a grid. So are x and y.
@@ -57,7 +59,7 @@ class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float
         pixels = np.stack(np.broadcast_arrays(x, y), axis=-1)
         return tuple(np.moveaxis(undistort(self.distortion_model, self.distortion, pixels), -1, 0))
 
-    def project(self, points):
+    def project(self, points: Any) -> np.ndarray:
         """Project points (..., 3) in the optical frame, z > 0, to pixels (..., 2). Inverse of `deproject`.
 
         Pixels may be outside the image; they are nan for rays without a pixel under the distortion model.
@@ -68,14 +70,14 @@ class Camera(NamedTuple('Camera', [('width', int), ('height', int), ('fx', float
             x, y = np.moveaxis(distort(self.distortion_model, self.distortion, np.stack((x, y), axis=-1)), -1, 0)
         return np.stack((x * self.fx + self.cx, y * self.fy + self.cy), axis=-1)
 
-    def undistort(self, pixels):
+    def undistort(self, pixels: np.ndarray) -> np.ndarray:
         """Positions of pixels (..., 2) without distortion, with the same fx, fy, cx and cy; nan without a ray."""
         if not self.distortion_model:
             return pixels
         return self.deproject(pixels, 1.0)[..., :2] * (self.fx, self.fy) + (self.cx, self.cy)
 
 
-def check_intrinsics(camera):
+def check_intrinsics(camera: Camera) -> None:
     """Raise ValueError if the intrinsics cannot be those of a camera with images of this size, but belong to images of
     another size, for example: positions would be wrong by a factor.
     """
@@ -88,22 +90,22 @@ def check_intrinsics(camera):
                          '%g degrees expected' % ((view, camera.fx) + camera[:2] + VIEWS_DEG))
 
 
-def transform_from(translation, quaternion):
+def transform_from(translation: Vector, quaternion: Vector) -> np.ndarray:
     """Create a 4x4 matrix from a translation (x, y, z) in metres and a quaternion (x, y, z, w), which is normalised.
     Raises ValueError if it cannot be (zero, nan or inf).
     """
-    quaternion = np.asarray(quaternion, float)
-    norm = np.sqrt(quaternion.dot(quaternion))
+    given = np.asarray(quaternion, float)
+    norm = np.sqrt(given.dot(given))
     if not (np.isfinite(norm) and norm > 1e-6):
-        raise ValueError('quaternion %s is not a rotation' % (tuple(quaternion.tolist()),))
-    x, y, z, w = (quaternion / norm).tolist()
+        raise ValueError('quaternion %s is not a rotation' % (tuple(given.tolist()),))
+    x, y, z, w = (given / norm).tolist()
     return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), translation[0]],
                      [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w), translation[1]],
                      [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y), translation[2]],
                      [0.0, 0.0, 0.0, 1.0]])
 
 
-def quaternion_from(matrix):
+def quaternion_from(matrix: np.ndarray) -> np.ndarray:
     """Quaternion (x, y, z, w), w >= 0, of the rotation of a 4x4 matrix. Inverse of `transform_from`."""
     m = matrix
     xx, yy, zz = np.diag(m)[:3]
@@ -118,6 +120,6 @@ def quaternion_from(matrix):
     return quaternion if quaternion[3] >= 0 else -quaternion
 
 
-def transform_points(b_from_a, points):
+def transform_points(b_from_a: np.ndarray, points: Any) -> np.ndarray:
     """Transform points (..., 3) from frame a to frame b."""
     return np.asarray(points, float).dot(b_from_a[:3, :3].T) + b_from_a[:3, 3]

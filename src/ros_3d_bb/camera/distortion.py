@@ -11,6 +11,7 @@ no real lens stretches that much. OpenCV is imported only where it is used: it t
 camera has no distortion.
 """
 import functools
+from typing import Any, Sequence, Tuple
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -31,7 +32,7 @@ MODELS = {PLUMB_BOB: (4, 5, 'k1, k2, p1, p2, k3'), RATIONAL_POLYNOMIAL: (8, 8, '
           INVERSE_BROWN_CONRADY: (5, 5, 'k1, k2, p1, p2, k3'), EQUIDISTANT: (4, 4, 'k1, k2, k3, k4')}
 
 
-def checked_distortion(model, coefficients):
+def checked_distortion(model: str, coefficients: Sequence[float]) -> Tuple[str, Tuple[float, ...]]:
     """Validate a distortion for `camera_model.Camera`. Returns the model and all of its coefficients.
 
     Coefficients that are all zero mean no distortion, '' and (), except for the equidistant model, which is a fisheye
@@ -53,7 +54,7 @@ def checked_distortion(model, coefficients):
     return model, (coefficients + (0.0,) * most)[:most]
 
 
-def distort(model, coefficients, rays):
+def distort(model: str, coefficients: Tuple[float, ...], rays: Any) -> np.ndarray:
     """Distort rays (..., 2) to images (..., 2), nan for rays without an image. Inverse of `undistort`.
 
     The equidistant model is the fisheye of Kannala-Brandt, a polynomial in the angle to the axis. The others are
@@ -75,7 +76,7 @@ def distort(model, coefficients, rays):
     return np.where((radius <= _widest(model, coefficients))[..., np.newaxis], images, np.nan)
 
 
-def undistort(model, coefficients, images):
+def undistort(model: str, coefficients: Tuple[float, ...], images: Any) -> np.ndarray:
     """Undistort images (..., 2) to rays (..., 2), nan for images without a ray. Inverse of `distort`.
 
     OpenCV's solution is corrected until `distort` maps it to the images. One step suffices if OpenCV is exact; more are
@@ -96,7 +97,7 @@ def undistort(model, coefficients, images):
         return np.where(np.abs(errors).max(axis=-1, keepdims=True) <= FOUND, rays, np.nan)
 
 
-def _distort_brown(rays, coefficients, is_inverse):
+def _distort_brown(rays: np.ndarray, coefficients: Tuple[float, ...], is_inverse: bool) -> np.ndarray:
     """Distort rays by the radial and tangential polynomials of plumb_bob or rational_polynomial.
 
     The inverse Brown-Conrady model of librealsense equals plumb_bob, except that the tangential part is computed from
@@ -113,7 +114,7 @@ def _distort_brown(rays, coefficients, is_inverse):
     return bent + np.stack((2 * p1 * x * y + p2 * (r2 + 2 * x * x), 2 * p2 * x * y + p1 * (r2 + 2 * y * y)), axis=-1)
 
 
-def _solved_by_opencv(model, coefficients, images):
+def _solved_by_opencv(model: str, coefficients: np.ndarray, images: np.ndarray) -> np.ndarray:
     """Undistort images (n, 1, 2) to rays (n, 1, 2)."""
     import cv2
     if model == EQUIDISTANT:
@@ -126,21 +127,21 @@ def _solved_by_opencv(model, coefficients, images):
     return cv2.undistortPointsIter(images, UNIT, coefficients, None, None, until)
 
 
-def _radial(coefficients):
+def _radial(coefficients: Tuple[float, ...]) -> Tuple[Tuple[float, ...], Tuple[float, ...]]:
     """Radial coefficients: (k1, k2, k3) of the numerator and (k4, k5, k6) of the denominator."""
     k1, k2, _p1, _p2, k3 = coefficients[:5]
     return (k1, k2, k3), tuple(coefficients[5:]) or (0.0, 0.0, 0.0)
 
 
 @functools.lru_cache(maxsize=64)
-def _widest(model, coefficients):
+def _widest(model: str, coefficients: Tuple[float, ...]) -> float:
     """Distance of rays from the axis up to which the distortion increases monotonically, at most `WIDEST`."""
     if model == EQUIDISTANT:
         return np.tan(_turning_point(coefficients, (), np.arctan(WIDEST)))
     return _turning_point(*_radial(coefficients), WIDEST)
 
 
-def _turning_point(numerator, denominator, limit):
+def _turning_point(numerator: Tuple[float, ...], denominator: Tuple[float, ...], limit: float) -> float:
     """Smallest r > 0 at which r (1 + n1 r^2 + ...) / (1 + d1 r^2 + ...) has a maximum or a pole, at most `limit`."""
     n, d, r2 = Polynomial((1,) + numerator), Polynomial((1,) + denominator), Polynomial((0, 1))
     slope = (n + 2 * r2 * n.deriv()) * d - 2 * r2 * n * d.deriv()

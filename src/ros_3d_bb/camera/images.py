@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
+from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, Vector, transform_from
 from ros_3d_bb.camera.distortion import EQUIDISTANT
 
 FARTHEST_M = 100.0  # beyond the range of any depth camera
@@ -30,21 +30,21 @@ class DepthImage(NamedTuple):
     area_px: Optional[Tuple[int, int, int, int]] = None
 
     @property
-    def shape(self):
+    def shape(self) -> Tuple[int, ...]:
         """Height and width."""
         return self.values.shape
 
-    def part(self, rows, columns):
+    def part(self, rows: slice, columns: slice) -> np.ndarray:
         """The values in rows and columns (slices)."""
         return self.values[rows, columns]
 
-    def at(self, u, v):
+    def at(self, u: np.ndarray, v: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return the depth, metres, at the pixels in columns u and rows v (arrays of int), and whether it is valid."""
         depth_m = self.values[v, u].astype(float) * self.scale_m
         with np.errstate(invalid='ignore'):  # nan, of which the numpy of Ubuntu 20.04 warns
             return depth_m, (depth_m > 0) & (depth_m <= FARTHEST_M)
 
-    def measured_area(self):
+    def measured_area(self) -> Tuple[int, int, int, int]:
         """Rectangle (x1, y1, x2, y2) of the image without its black border, where registration leaves no depth.
 
         A border of more than `WIDEST_BORDER` of the width or height is not due to registration: its background is far
@@ -83,16 +83,16 @@ class RgbdFrame(NamedTuple):
     is_floor_known: bool = True  # whether this is ~floor_frame, in which the height of the floor is known
 
     @property
-    def up(self):
+    def up(self) -> Optional[Tuple[float, float, float]]:
         """Unit vector that points up, in the optical frame of the upright image, as a tuple; None if it is unknown."""
         return None if self.camera_from_floor is None else tuple(self.camera_from_floor[:3, 2].tolist())
 
     @property
-    def received(self):
+    def received(self) -> 'RgbdFrame':
         """The frame as received, before it was turned upright."""
         return self.turned(-self.turns)
 
-    def turned(self, turns):
+    def turned(self, turns: int) -> 'RgbdFrame':
         """The frame turned by some clockwise quarter turns."""
         if not turns:
             return self
@@ -104,16 +104,16 @@ class RgbdFrame(NamedTuple):
                              color=None if self.color is None else turned_image(self.color, turns),
                              turns=self.turns + turns, camera_from_floor=camera_from_floor)
 
-    def upright_rects(self, rects_px):
+    def upright_rects(self, rects_px: np.ndarray) -> np.ndarray:
         """Rectangles (n, 4) of the received image in the upright image. Inverse of `received_rects`."""
         return turned_boxes(rects_px, self.turns, *turned_camera(self.camera, -self.turns)[:2])
 
-    def received_rects(self, rects_px):
+    def received_rects(self, rects_px: np.ndarray) -> np.ndarray:
         """Rectangles (n, 4) of the upright image in the received image."""
         return turned_boxes(rects_px, -self.turns, *self.camera[:2])
 
 
-def turns_for(image_rotation, up):
+def turns_for(image_rotation: str, up: Optional[Vector]) -> int:
     """Quarter turns that make the images of a camera upright: `image_rotation`, clockwise degrees as text, or for
     `AUTO` those of the unit vector `up` (3,) in the optical frame, 0 if it is unknown (None).
     """
@@ -122,7 +122,7 @@ def turns_for(image_rotation, up):
     return 0 if up is None else quarter_turns(up)
 
 
-def quarter_turns(up):
+def quarter_turns(up: Vector) -> int:
     """Number of clockwise quarter turns after which the image is upright; `up` (3,) is in the optical frame.
 
     0 for an upright camera, 1 if the left edge of the image is up, 2 if the camera is upside down, 3 if the right edge
@@ -136,12 +136,12 @@ def quarter_turns(up):
     return 2 if y_up > 0 else 0
 
 
-def turned_image(values, turns):
+def turned_image(values: np.ndarray, turns: int) -> np.ndarray:
     """A view of an image (height, width, ...) that is turned clockwise."""
     return np.rot90(values, -turns) if turns else values
 
 
-def turned_depth(depth, turns):
+def turned_depth(depth: Any, turns: int) -> Any:
     """A DepthImage or RegisteredDepth that is turned clockwise; of the latter, the whole image is registered."""
     if not turns:
         return depth
@@ -149,12 +149,12 @@ def turned_depth(depth, turns):
     return DepthImage(turned_image(depth.values, turns), depth.scale_m, tuple(area_px))
 
 
-def turned_rotation(turns):
+def turned_rotation(turns: int) -> np.ndarray:
     """Rotation (3, 3) from the optical frame of an image to that of the turned image."""
     return np.linalg.matrix_power(TURNED_FROM_CAMERA, turns)
 
 
-def mounted_camera(height_m, tilt_rad, turns, roll_rad=0.0):
+def mounted_camera(height_m: float, tilt_rad: float, turns: int, roll_rad: float = 0.0) -> np.ndarray:
     """Pose (4, 4) of the optical frame of a camera that looks along x, above the origin of a frame whose z points up.
 
     Angles are as in REP 103: with a positive `tilt_rad`, its pitch, the camera looks down, and with a positive
@@ -168,7 +168,7 @@ def mounted_camera(height_m, tilt_rad, turns, roll_rad=0.0):
 
 
 @functools.lru_cache(maxsize=16)
-def turned_camera(camera, turns):
+def turned_camera(camera: Camera, turns: int) -> Camera:
     """The `camera_model.Camera` of the turned image, including its lens distortion."""
     for _turn in range(turns % 4):
         distortion = camera.distortion
@@ -180,7 +180,7 @@ def turned_camera(camera, turns):
     return camera
 
 
-def turned_boxes(boxes, turns, width, height):
+def turned_boxes(boxes: np.ndarray, turns: int, width: int, height: int) -> np.ndarray:
     """Boxes (n, 4) of an image of `width` x `height` pixels, in the turned image."""
     for _turn in range(turns % 4):
         x1, y1, x2, y2 = boxes.T

@@ -4,10 +4,12 @@ Each depth pixel is a point that is projected into the colour image. There it co
 nearest point wins. Only the part of the image that is asked for is registered, in the resolution that is asked for: the
 samples in a box need a few thousand points, the whole image hundreds of thousands.
 """
+from typing import Optional, Tuple
+
 import numpy as np
 
-from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.camera.images import FARTHEST_M
+from ros_3d_bb.camera.camera_model import Camera, transform_points
+from ros_3d_bb.camera.images import FARTHEST_M, DepthImage
 
 NEAREST_M = 0.4  # lower bound of the depth of people, for the part of the depth image that is registered
 BORDER_AT_M = 2.0  # depth at which the border of the depth image is projected; people are cut at about this distance
@@ -20,7 +22,7 @@ class Registration(object):
     (4, 4) transforms between their optical frames.
     """
 
-    def __init__(self, color_camera, depth_camera, color_from_depth):
+    def __init__(self, color_camera: Camera, depth_camera: Camera, color_from_depth: np.ndarray) -> None:
         self.color_camera, self.depth_camera, self.color_from_depth = color_camera, depth_camera, color_from_depth
         self._depth_from_color = np.linalg.inv(color_from_depth)
         u, v = np.arange(depth_camera.width), np.arange(depth_camera.height)[:, np.newaxis]
@@ -30,16 +32,15 @@ class Registration(object):
         self._pitch_px = color_camera.fx / depth_camera.fx, color_camera.fy / depth_camera.fy
         self.area_px = self._area()
 
-    def register(self, depth, rows, columns):
+    def register(self, depth: DepthImage, rows: slice, columns: slice) -> np.ndarray:
         """Register a raw DepthImage to the pixels in rows and columns (slices) of the colour image. Returns the depth
         (h, w) in metres; 0 where none was measured.
         """
-        rows = range(*rows.indices(self.color_camera.height))
-        columns = range(*columns.indices(self.color_camera.width))
-        if not (rows and columns):
-            return np.zeros((len(rows), len(columns)))
-        across, down = _Cells(columns, self._pitch_px[0]), _Cells(rows, self._pitch_px[1])
-        part = self._part_towards(rows, columns, across.stride, down.stride)
+        v, u = range(*rows.indices(self.color_camera.height)), range(*columns.indices(self.color_camera.width))
+        if not (u and v):
+            return np.zeros((len(v), len(u)))
+        across, down = _Cells(u, self._pitch_px[0]), _Cells(v, self._pitch_px[1])
+        part = self._part_towards(v, u, across.stride, down.stride)
         with np.errstate(all='ignore'):  # of what is no depth
             depth_m = depth.values[part].astype(np.float32) * np.float32(depth.scale_m)
             points = self._rays[part] * depth_m[..., np.newaxis] + self._offset_m
@@ -53,7 +54,7 @@ class Registration(object):
         nearest_m[np.isinf(nearest_m)] = 0
         return nearest_m.reshape(down.count, across.count)[down.of_samples[:, np.newaxis], across.of_samples]
 
-    def _part_towards(self, rows, columns, stride_x, stride_y):
+    def _part_towards(self, rows: range, columns: range, stride_x: int, stride_y: int) -> Tuple[slice, slice]:
         """Slices of the depth image that contain what a rectangle of the colour image shows from `NEAREST_M` on."""
         height, width = self._rays.shape[:2]
         whole = slice(0, height, stride_y), slice(0, width, stride_x)
@@ -71,7 +72,7 @@ class Registration(object):
         right, bottom = np.clip(pixels.max(axis=0) + margin_px + 1, 0, (width, height)).astype(int).tolist()
         return slice(top, bottom, stride_y), slice(left, right, stride_x)
 
-    def _area(self):
+    def _area(self) -> Tuple[int, int, int, int]:
         """Rectangle (x1, y1, x2, y2) of the colour image in which depth is measured, for a depth of `BORDER_AT_M`."""
         points = self._rays * BORDER_AT_M + self.color_from_depth[:3, 3]
         width, height = self.color_camera[:2]
@@ -81,8 +82,8 @@ class Registration(object):
                 pixels = self.color_camera.project(edge)[:, axis]
             pixels = pixels[np.isfinite(pixels) & (edge[:, 2] > 0)]
             edges_px.append(np.median(pixels) if pixels.size else np.nan)
-        edges_px = np.where(np.isfinite(edges_px), edges_px, (0, 0, width, height))
-        left, top, right, bottom = np.clip(edges_px, 0, (width, height, width, height)).astype(int).tolist()
+        known_px = np.where(np.isfinite(edges_px), edges_px, (0, 0, width, height))
+        left, top, right, bottom = np.clip(known_px, 0, (width, height, width, height)).astype(int).tolist()
         return (left, top, right, bottom) if left < right and top < bottom else (0, 0, width, height)
 
 
@@ -91,32 +92,33 @@ class RegisteredDepth(object):
 
     scale_m = 1.0
 
-    def __init__(self, depth, registration):
-        self._depth, self._registration, self._values = depth, registration, None
+    def __init__(self, depth: DepthImage, registration: Registration) -> None:
+        self._depth, self._registration = depth, registration
+        self._values: Optional[np.ndarray] = None
 
     @property
-    def shape(self):
+    def shape(self) -> Tuple[int, int]:
         """Height and width of the colour image."""
         camera = self._registration.color_camera
         return camera.height, camera.width
 
     @property
-    def values(self):
+    def values(self) -> np.ndarray:
         """The whole image, (height, width); registered when it is first used."""
         if self._values is None:
             self._values = self.part(slice(None), slice(None))
         return self._values
 
-    def part(self, rows, columns):
+    def part(self, rows: slice, columns: slice) -> np.ndarray:
         """The values in rows and columns (slices)."""
         return self._registration.register(self._depth, rows, columns)
 
-    def at(self, u, v):
+    def at(self, u: np.ndarray, v: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """As `DepthImage.at`."""
         depth_m = self.values[v, u]
         return depth_m, depth_m > 0
 
-    def measured_area(self):
+    def measured_area(self) -> Tuple[int, int, int, int]:
         """As `DepthImage.measured_area`."""
         return self._registration.area_px
 
@@ -128,7 +130,7 @@ class _Cells(object):
     of the cell: a larger cell would widen what is near.
     """
 
-    def __init__(self, samples, pitch_px):
+    def __init__(self, samples: range, pitch_px: float) -> None:
         step_px = samples.step
         self.stride = max(1, int(step_px / (OVERLAP * pitch_px)))
         point_px = OVERLAP * pitch_px * self.stride
@@ -138,7 +140,7 @@ class _Cells(object):
         self.of_samples = ((np.arange(len(samples)) + 0.5) * step_px / self._size_px).astype(int)
         self.count = self.of_samples[-1] + 1
 
-    def of(self, pixels):
+    def of(self, pixels: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Numbers of the cells at pixel coordinates (n,), as floats, and whether a point there counts."""
         offsets = (pixels - self._first_px) / self._size_px
         numbers = np.floor(offsets)

@@ -52,15 +52,15 @@ def absolute(name):
     return '/' + name.lstrip('/')
 
 
-def topic_of(camera, topic):
+def topic_of(camera_name, topic):
     """Return the name of a topic for a camera, given by its namespace; '' for a single camera.
 
     Images are on the topics of a driver with that camera name (front/color/image_raw), results are in the same
     namespace (front/ros_3d_bb/bb_3d).
     """
-    if not camera:
+    if not camera_name:
         return topic
-    return '%s/%s' % (camera, topic[len(CAMERA) + 1:] if topic.startswith(CAMERA + '/') else topic)
+    return '%s/%s' % (camera_name, topic[len(CAMERA) + 1:] if topic.startswith(CAMERA + '/') else topic)
 
 
 def info_topic_beside(image_topic):
@@ -132,6 +132,6 @@ def _camera_info(camera, header):
     return info
 
 
-def frame_id_of(camera):
+def frame_id_of(camera_name):
     """Return the frame of the images of a camera, given by its name; '' for a single camera."""
-    return '%s_color_optical_frame' % (camera or CAMERA)
+    return '%s_color_optical_frame' % (camera_name or CAMERA)

@@ -5,9 +5,10 @@ import os
 import signal
 import sys
 import tempfile
+from typing import Iterator
 
 
-def atomic_write(path, data):
+def atomic_write(path: str, data: bytes) -> None:
     """Write the bytes `data` to `path` atomically: after an error or a crash the old content is intact."""
     with replacement_of(path) as temporary:
         with open(temporary, 'wb') as stream:
@@ -17,7 +18,7 @@ def atomic_write(path, data):
 
 
 @contextlib.contextmanager
-def replacement_of(path, prefix='.', suffix='.tmp'):
+def replacement_of(path: str, prefix: str = '.', suffix: str = '.tmp') -> Iterator[str]:
     """Yield the name of an empty file in the folder of `path`, which replaces `path` when the block ends, or is removed
     if the block raises an exception. No other process has this name.
 
@@ -36,12 +37,12 @@ def replacement_of(path, prefix='.', suffix='.tmp'):
         raise
 
 
-def check_writable(path):
+def check_writable(path: str) -> None:
     """Raise OSError if a file cannot be written to `path`. For commands that run long before they write."""
     os.unlink(_new_file_beside(path, '.', '.tmp'))
 
 
-def _new_file_beside(path, prefix, suffix):
+def _new_file_beside(path: str, prefix: str, suffix: str) -> str:
     if os.path.isdir(path):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), path)
     try:
@@ -52,7 +53,7 @@ def _new_file_beside(path, prefix, suffix):
     return name
 
 
-def clean_up_on_sigterm():
+def clean_up_on_sigterm() -> None:
     """Let SIGTERM, and SIGHUP unless nohup has disabled it, end this command by SystemExit, so that it cleans up."""
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) == signal.SIG_DFL:

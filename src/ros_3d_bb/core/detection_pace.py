@@ -3,6 +3,7 @@ import collections
 import math
 import statistics
 import threading
+from typing import Deque, List, Optional, Sequence, Tuple
 
 from ros_3d_bb.core.time_sync import NS, median_period_ns
 
@@ -23,7 +24,7 @@ PERSON_M = 1.7  # height of a person
 MIN_PERSON_PX = 75
 
 
-def sizes_for_range(range_m, focal_px, image_px):
+def sizes_for_range(range_m: float, focal_px: float, image_px: int) -> Tuple[int, ...]:
     """The `SIZES` in which a standing person at a range is at least `MIN_PERSON_PX` high; at least the largest one.
 
     `focal_px` is the focal length, and `image_px` the longer side of the images of the camera.
@@ -52,21 +53,23 @@ class DetectionPace(object):
         Number of images from one detection to the next.
     """
 
-    def __init__(self, sizes=(0,)):
+    def __init__(self, sizes: Sequence[int] = (0,)) -> None:
         self._lock = threading.Lock()
-        self._stamps_ns, self._durations_s = collections.deque(maxlen=WINDOW), []
+        self._stamps_ns: Deque[int] = collections.deque(maxlen=WINDOW)
+        self._durations_s: List[float] = []
         self._sizes, self.size, self.interval = tuple(sizes), max(sizes), 1
-        self._windows_with_time, self._windows_since_increase, self._patience = 0, None, PATIENCE
-        self._detected_ns = None  # stamp of the newest image for detection
+        self._windows_with_time, self._patience = 0, PATIENCE
+        self._windows_since_increase: Optional[int] = None
+        self._detected_ns: Optional[int] = None  # stamp of the newest image for detection
 
-    def use_sizes(self, sizes):
+    def use_sizes(self, sizes: Sequence[int]) -> None:
         """Choose from other sizes. The current one is kept if it is among them; otherwise the largest one is tried."""
         with self._lock:
             if tuple(sizes) != self._sizes:
                 self._sizes = tuple(sizes)
                 self._set(self.size if self.size in sizes else max(sizes), 1)
 
-    def add_image(self, stamp_ns):
+    def add_image(self, stamp_ns: int) -> bool:
         """Add the stamp of an image that arrived. Returns whether to detect in it."""
         with self._lock:
             self._stamps_ns.append(stamp_ns)
@@ -77,7 +80,7 @@ class DetectionPace(object):
             self._detected_ns = stamp_ns
             return True
 
-    def add_detection(self, duration_s):
+    def add_detection(self, duration_s: float) -> bool:
         """Add the duration of a detection with the current size. Returns whether size or interval changed."""
         with self._lock:
             self._durations_s.append(duration_s)
@@ -94,23 +97,23 @@ class DetectionPace(object):
                 return True
             increased = self._increased(duration_s, period_s)
             self._windows_with_time = 0 if increased is None else self._windows_with_time + self.interval
-            if self._windows_with_time < self._patience:
+            if increased is None or self._windows_with_time < self._patience:
                 return False
             self._set(*increased)
             self._windows_since_increase = 0
             return True
 
-    def _adapt_patience(self):
+    def _adapt_patience(self) -> None:
         """Double the patience if the last increase is undone soon; otherwise reset it."""
         if self._windows_since_increase is not None:
             was_soon = self._windows_since_increase <= SOON
             self._patience = min(2 * self._patience, MAX_PATIENCE) if was_soon else PATIENCE
 
-    def _set(self, size, interval):
+    def _set(self, size: int, interval: int) -> None:
         self.size, self.interval = size, interval
         self._durations_s, self._windows_with_time, self._windows_since_increase = [], 0, None
 
-    def _reduced(self, duration_s, period_s):
+    def _reduced(self, duration_s: float, period_s: float) -> Optional[Tuple[int, int]]:
         """Size and interval with less work, if detections take too long; else None."""
         longest_s = BUSY_SHARE * max(TARGET_PERIOD_S, period_s)
         smaller = [size for size in self._sizes if size < self.size]
@@ -120,7 +123,7 @@ class DetectionPace(object):
         interval = math.ceil(duration_s / period_s)
         return (self.size, interval) if interval > self.interval else None
 
-    def _increased(self, duration_s, period_s):
+    def _increased(self, duration_s: float, period_s: float) -> Optional[Tuple[int, int]]:
         """Size and interval with more work, if there is time for it; else None."""
         interval = math.ceil(duration_s / (FASTER_SHARE * period_s))
         if interval < self.interval:

@@ -17,7 +17,7 @@ class DetectorModel(NamedTuple):
     max_range_m: Optional[float] = None
 
 
-def checked(model):
+def checked(model: DetectorModel) -> DetectorModel:
     """Return the DetectorModel after validation. Raises ValueError, with the bad value, if it is unusable."""
     for name in ('lasting_sigma_m', 'correlation_time_s'):
         if not 0 <= getattr(model, name) <= 10:

@@ -1,6 +1,6 @@
 """Classes of objects: names, usual sizes, motion, and groups that detectors confuse. See config/classes.yaml."""
 import re
-from typing import NamedTuple, Optional
+from typing import Any, Dict, NamedTuple, Optional, Tuple
 
 import numpy as np
 import yaml
@@ -46,13 +46,13 @@ class ObjectClass(NamedTuple):
     initial_speed: float = 1.0
 
     @property
-    def largest_m(self):
+    def largest_m(self) -> Tuple[float, float]:
         """Upper bounds of width and height, metres; those of people follow from their usual height."""
         if self.group == PERSON and self.height:
             return WIDEST_PERSON * self.height, TALLEST_PERSON * self.height
         return MAX_SIZE_M, MAX_SIZE_M
 
-    def axis_behind(self, seen_m):
+    def axis_behind(self, seen_m: float) -> float:
         """Distance from the visible surface to the vertical axis of an object that appears `seen_m` wide.
 
         Without a given distance, it is half of the width. An elongated object appears the wider the more it is seen
@@ -93,24 +93,24 @@ RANGES = {'width': MAX_SIZE_M, 'height': MAX_SIZE_M, 'length': MAX_SIZE_M, 'axis
 class ObjectClasses(NamedTuple):
     """Table of classes: {name: ObjectClass} of those that are listed, and the ObjectClass of all others."""
 
-    listed: dict = CLASSES
+    listed: Dict[str, ObjectClass] = CLASSES
     default: ObjectClass = DEFAULT_CLASS
 
-    def of(self, label):
+    def of(self, label: str) -> ObjectClass:
         """The ObjectClass of a class name."""
         return self.listed.get(label, self.default)
 
-    def standard_name(self, label):
+    def standard_name(self, label: str) -> str:
         """Name of a class in this package: `PERSON` for its other names in data sets, such as Pedestrian, unless the
         table lists them."""
         return PERSON if label not in self.listed and label.lower() in PEOPLE else label
 
-    def group_of(self, label):
+    def group_of(self, label: str) -> str:
         """Name of the group of a class: that of the table, or the class itself."""
         return self.of(label).group or label
 
 
-def read_object_classes(path):
+def read_object_classes(path: str) -> ObjectClasses:
     """Read a table of classes in the format of config/classes.yaml; an empty path gives the table in the code.
 
     Raises ValueError if the file cannot be read, is not YAML, or has an unknown key or an invalid value; the message
@@ -125,7 +125,7 @@ def read_object_classes(path):
         raise ValueError('the table of classes %s cannot be used: %s' % (path, error))
 
 
-def object_classes_from(content):
+def object_classes_from(content: Any) -> ObjectClasses:
     """Convert the content of a file of classes to ObjectClasses. Raises ValueError."""
     if not (isinstance(content, dict) and set(content) <= {'classes', 'default'}
             and isinstance(content.get('classes'), dict)):
@@ -148,7 +148,7 @@ def object_classes_from(content):
     return table
 
 
-def _class_from(name, entry):
+def _class_from(name: Any, entry: Any) -> ObjectClass:
     if not isinstance(name, str) or label_fault(name):
         raise ValueError(label_fault(str(name)) or 'the class name %r is a %s; text expected, in quotes'
                          % (name, type(name).__name__))
@@ -163,20 +163,21 @@ def _class_from(name, entry):
                 raise ValueError('%s.group is %.80r; a name expected' % (name, value))
         elif isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value <= RANGES[key]:
             raise ValueError('%s.%s is %.80r; a number from 0 to %g expected' % (name, key, value, RANGES[key]))
-    return ObjectClass(**{key: value if key == 'group' else float(value) for key, value in entry.items()})
+    values: Dict[str, Any] = {key: value if key == 'group' else float(value) for key, value in entry.items()}
+    return ObjectClass(**values)
 
 
-def usable_label(name):
+def usable_label(name: Any) -> str:
     """Replace the characters of a class name that messages cannot carry by underscores, and shorten a long name."""
     return UNUSABLE.sub('_', str(name).strip())[:MAX_LENGTH] or '_'
 
 
-def described(label, text):
+def described(label: str, text: str) -> str:
     """A short text about an object, after its class unless it is a person."""
     return text if label == PERSON else '%s %s' % (label, text)
 
 
-def label_fault(name):
+def label_fault(name: str) -> str:
     """Description of what is wrong with a class name from a message; empty if it can be used."""
     if name and len(name) <= MAX_LENGTH and not UNUSABLE.search(name):
         return ''
@@ -184,6 +185,6 @@ def label_fault(name):
             % (ascii(name), MAX_LENGTH))
 
 
-def score_fault(score):
+def score_fault(score: float) -> str:
     """Description of what is wrong with a score from a message; empty if it can be used. 0 means unknown."""
     return '' if 0 <= score <= 1 else 'the score %g; 0..1 expected' % score

@@ -3,7 +3,7 @@ import difflib
 import json
 import re
 import sys
-from typing import Any, NamedTuple, Tuple, Union
+from typing import Any, Callable, Dict, Iterable, List, Mapping, NamedTuple, Tuple, Union
 
 LARGEST = 1e6
 MAX_FLOAT = sys.float_info.max
@@ -14,8 +14,8 @@ class NestedList(str):
     and JSON. A file may also contain the list itself."""
 
 
-class Param(NamedTuple):
-    """Schema of one parameter, given as the default of a field of a NamedTuple."""
+class ParamSchema(NamedTuple):
+    """Schema of one parameter, given as the default of a field of a NamedTuple, under the name `Param`."""
 
     default: Any  # bool, int, float, str or tuple
     text: str = ''  # description in sentences; empty if the `doc=` of the corresponding launch argument describes it
@@ -26,21 +26,22 @@ class Param(NamedTuple):
     section: str = ''  # heading in config/*.yaml and group in rqt_reconfigure
 
     @property
-    def allowed(self):
+    def allowed(self) -> str:
         low, high = self.limits
         if self.choices:
             return 'one of ' + ', '.join(self.choices)
         return '%g or more' % low if high == LARGEST else '%g to %.10g' % (low, high)
 
     @property
-    def facts(self):
+    def facts(self) -> str:
         """Unit, allowed values unless they are the default (any text, or numbers from 0), and live range."""
         unit = 'Unit: %s.' % self.unit if self.unit else ''
         allowed = 'Allowed: %s.' % self.allowed if self.choices or self.limits != (0, LARGEST) else ''
-        live = ('Live.' if self.live is True else 'Live: %g to %g.' % self.live) if self.live else ''
+        live = 'Live: %g to %g.' % self.live if isinstance(self.live, tuple) else 'Live.' if self.live else ''
         return ' '.join(filter(None, (unit, allowed, live)))
 
 
+Param: Any = ParamSchema  # for type checkers: of the type of the field
 SET_BY_LAUNCH = 'Set by launch files'
 # Shared by several nodes.
 DEPTH_SCALE = Param(
@@ -61,12 +62,12 @@ TRACKS_TIMEOUT = Param(
 WAIT_FOR_SUBSCRIBERS = Param(0, 'Start once the colour image has this many subscribers, so that they miss no image.')
 
 
-def parameters(section=''):
+def parameters(section: str = '') -> Callable[[Any], Any]:
     """Class decorator for a NamedTuple whose fields have a Param as their default.
 
     The Params are stored by name in the class attribute `PARAMS`. A Param without a section gets the given one.
     """
-    def decorate(kind):
+    def decorate(kind: Any) -> Any:
         kind.PARAMS = {}
         for name in kind._fields:
             param = kind._field_defaults[name]
@@ -78,12 +79,12 @@ def parameters(section=''):
     return decorate
 
 
-def table_of(kinds):
+def table_of(kinds: Iterable[Any]) -> Dict[str, ParamSchema]:
     """Merge the schemas of several types into one table, {name: Param}; shared names appear once."""
     return {name: kind.PARAMS[name] for kind in kinds for name in kind._fields}
 
 
-def params_from(given, *kinds):
+def params_from(given: Mapping[str, Any], *kinds: Any) -> List[Any]:
     """Fill types decorated with `parameters` from a flat dictionary; missing keys keep their defaults.
 
     A float may be given as an int, a str as a number (roslaunch converts `0` to one), a list as `a, b`, a NestedList as
@@ -102,12 +103,12 @@ def params_from(given, *kinds):
     return filled
 
 
-def nearest_name(name, known):
+def nearest_name(name: str, known: Iterable[str]) -> str:
     """The known name that is most similar to an unknown one."""
     return difflib.get_close_matches(name, known, 1, 0.0)[0]
 
 
-def check(params):
+def check(params: Any) -> None:
     """Raise ValueError, naming the parameter, if a value is not allowed by its Param."""
     for name, param in params.PARAMS.items():
         value = getattr(params, name)
@@ -121,7 +122,7 @@ def check(params):
                     name, word, nearest_name(str(word), param.choices), ', '.join(param.choices)))
 
 
-def with_places(sentence, place_of):
+def with_places(sentence: str, place_of: Callable[[str], str]) -> str:
     """Append to a sentence where the parameters that it names (~stride) are set.
 
     `place_of` returns the option or launch argument for the name of a parameter; empty if there is none.
@@ -131,7 +132,7 @@ def with_places(sentence, place_of):
     return sentence + (' (%s)' % '; '.join(places) if places else '')
 
 
-def _converted(name, value, kind):
+def _converted(name: str, value: Any, kind: Any) -> Any:
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if isinstance(value, kind) and isinstance(value, bool) == (kind is bool):
         return value

@@ -1,4 +1,5 @@
 """Which nodes send the messages on a topic."""
+from typing import Any, Set, Tuple
 
 
 class Senders(object):
@@ -8,23 +9,24 @@ class Senders(object):
     name, such as the player of a bag, only follows the former one.
     """
 
-    def __init__(self):
-        self._latest, self._nodes, self._alternate = '', set(), False
+    def __init__(self) -> None:
+        self._latest, self._alternate = '', False
+        self._nodes: Set[str] = set()
 
-    def add(self, node):
+    def add(self, node: str) -> None:
         """Record the sender of a message."""
         if node != self._latest:
             self._alternate = self._alternate or node in self._nodes
             self._nodes.add(node)
             self._latest = node
 
-    def take(self):
+    def take(self) -> Tuple[str, ...]:
         """Names of the nodes that have sent at once since the last call; empty if only one sent at a time."""
         found = tuple(sorted(self._nodes)) if self._alternate else ()
         self._nodes, self._alternate = {self._latest}, False
         return found
 
 
-def sender_of(message):
+def sender_of(message: Any) -> str:
     """Name of the node that has sent a received message; empty for a message of a bag."""
     return getattr(message, '_connection_header', {}).get('callerid', '')

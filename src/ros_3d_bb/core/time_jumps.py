@@ -1,5 +1,6 @@
 """Jumps of time, as when a bag or a simulated scene starts again."""
 import time
+from typing import Dict, Optional, Tuple
 
 from ros_3d_bb.core.time_sync import JUMP_NS, NS
 
@@ -13,10 +14,11 @@ class TimeJumps(object):
     `SETTLING_S` after a jump, while `are_recent`, stamps and ROS time may disagree although each is right.
     """
 
-    def __init__(self):
-        self._latest, self._jumped_s = {}, float('-inf')  # (time of the clock, machine time in seconds), by clock
+    def __init__(self) -> None:
+        self._latest: Dict[str, Tuple[int, float]] = {}  # (time of the clock, machine time in seconds), by clock
+        self._jumped_s = float('-inf')
 
-    def see(self, clock, time_ns, now_s=None):
+    def see(self, clock: str, time_ns: int, now_s: Optional[float] = None) -> None:
         """Record the time of a clock, given by a name, at a monotonic time, by default the current one."""
         now_s = time.monotonic() if now_s is None else now_s
         before_ns, before_s = self._latest.get(clock, (time_ns, now_s))
@@ -24,6 +26,6 @@ class TimeJumps(object):
         if not -JUMP_NS <= time_ns - before_ns <= (now_s - before_s) * NS + JUMP_NS:
             self._jumped_s = now_s
 
-    def are_recent(self, now_s=None):
+    def are_recent(self, now_s: Optional[float] = None) -> bool:
         """Whether a clock has jumped within the last `SETTLING_S`."""
         return (time.monotonic() if now_s is None else now_s) - self._jumped_s <= SETTLING_S

@@ -48,7 +48,7 @@ class Bbox3dNode(object):
         self._images = SampleImages(params, self._stage, self._diagnostics)
         self._inputs = part.inputs or RgbdInputs(params, self._diagnostics, part.transforms,
                                                  cache_s=params.cache_length, assumed_delay_s=params.assumed_delay)
-        self._inputs.pipeline.connect_estimator(self._stage, self._diagnostics, self._publish)
+        self._inputs.pipeline.connect_estimator(self._stage.estimate, self._diagnostics, self._publish)
         if params.depth != RAW:
             self._diagnostics.check(DepthCameraCheck(with_frames=not params.frame_id).faults)
         self._source = self._inputs.pipeline.source

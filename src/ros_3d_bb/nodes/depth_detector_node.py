@@ -34,7 +34,7 @@ class DepthDetectorNode(object):
         self._pipeline = self.inputs.pipeline
         worker = DetectorWorker(params, self._diagnostics, self._detect, self._stage.names,
                                 part._replace(next_stage=self._pipeline.estimate))
-        self._pipeline.connect_detector(self._stage, worker.offer)
+        self._pipeline.connect_detector(self._stage.detect, worker.offer)
         subscribe(COLOR_TOPIC, Image, self.inputs.receiver('colour images', self._pipeline.source.add_color))
         ReconfigureServer([params, people], self._reconfigure, part.namespace)
 

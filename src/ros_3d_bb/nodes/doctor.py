@@ -73,17 +73,17 @@ def graph_findings(arguments):
     shutdown = threading.Event()
     rospy.on_shutdown(shutdown.set)  # on Ctrl-C, because rospy handles the signal itself
     while True:
-        cameras = [str(camera) for camera in tracker_param('cameras')] or ['']  # '': a single one
-        camera = arguments.camera or cameras[0]
-        observer = GraphObserver(arguments.target_frame, camera)
+        camera_names = [str(name) for name in tracker_param('cameras')] or ['']  # '': a single one
+        camera_name = arguments.camera or camera_names[0]
+        observer = GraphObserver(arguments.target_frame, camera_name)
         if shutdown.wait(arguments.seconds):
             raise KeyboardInterrupt
         seen = observer.observations()
         found = _namespace_findings(seen.nodes) or findings(seen)  # findings of another namespace would mislead
         observer.close()
-        if len(cameras) > 1:
+        if len(camera_names) > 1:
             found.insert(0, Finding('cameras', '%s; of %s, checked one at a time: doctor --camera NAME'
-                                    % (camera, ', '.join(cameras))))
+                                    % (camera_name, ', '.join(camera_names))))
         if not any(finding.fault for finding in found) or time.monotonic() >= deadline_s:
             return found
 

@@ -67,23 +67,23 @@ class TrackerNode(object):
                                     self._track_ids.last_id)
         self._tracks_pub = rospy.Publisher(TRACKS_TOPIC, TrackedObjectArray, queue_size=10)
         self._markers_pub = rospy.Publisher(MARKERS_TOPIC, MarkerArray, queue_size=10)
-        for camera in self._stage.cameras:
-            self._subscribe(camera, params, part.subscribes)
+        for camera_name in self._stage.views:
+            self._subscribe(camera_name, params, part.subscribes)
         self._uses_depth = params.use_depth
         if params.use_map:
             subscribe('map', OccupancyGrid, self._on_map, 1, is_irregular=True)
         self._markers.areas_m = self._stage.ignored_areas
         ReconfigureServer(given, self._reconfigure, part.namespace)
 
-    def _subscribe(self, camera, params, with_boxes):
-        depth_topic = topic_of(camera, DEPTH_TOPICS[params.depth][0])
+    def _subscribe(self, camera_name, params, with_boxes):
+        depth_topic = topic_of(camera_name, DEPTH_TOPICS[params.depth][0])
 
         def of_camera(callback):
-            return functools.partial(callback, camera=camera)
+            return functools.partial(callback, camera_name=camera_name)
         if with_boxes:
-            subscribe(topic_of(camera, BOXES3D_TOPIC), BoundingBox3DArray, of_camera(self._on_boxes))
-        subscribe_camera_info(topic_of(camera, INFO_TOPICS[0]), topic_of(camera, COLOR_INFO_IMAGES[params.depth]),
-                              of_camera(self._on_camera_info), 1)
+            subscribe(topic_of(camera_name, BOXES3D_TOPIC), BoundingBox3DArray, of_camera(self._on_boxes))
+        images_topic = topic_of(camera_name, COLOR_INFO_IMAGES[params.depth])
+        subscribe_camera_info(topic_of(camera_name, INFO_TOPICS[0]), images_topic, of_camera(self._on_camera_info), 1)
         if params.use_depth and with_boxes:
             subscribe(depth_topic, Image, of_camera(self._on_depth), KEPT_AT_ONCE)
         if params.use_depth and params.depth == RAW:
@@ -101,17 +101,17 @@ class TrackerNode(object):
             self._stage.set_map(message)
             self._diagnostics.count('maps used')
 
-    def _on_camera_info(self, message, camera):
+    def _on_camera_info(self, message, camera_name):
         with self._diagnostics.receiving('camera_info'):
-            self._stage.add_camera_info(message, camera)
+            self._stage.views[camera_name].add_camera_info(message)
 
-    def _on_depth_camera_info(self, message, camera):
+    def _on_depth_camera_info(self, message, camera_name):
         with self._diagnostics.receiving('camera_info of depth'):
-            self._stage.add_depth_camera_info(message, camera)
+            self._stage.views[camera_name].add_depth_camera_info(message)
 
-    def _on_depth(self, message, camera):
+    def _on_depth(self, message, camera_name):
         with self._diagnostics.receiving('depth images'):
-            self._stage.add_depth(message, arrival_clock_ns(), camera)
+            self._stage.views[camera_name].add_depth(message, arrival_clock_ns())
 
     def on_frame(self, message, depth_msg):
         """Process the 3D boxes and the depth image of a frame."""
@@ -119,9 +119,9 @@ class TrackerNode(object):
             self._on_depth(depth_msg, '')
         self._on_boxes(message)
 
-    def _on_boxes(self, message, camera=''):
+    def _on_boxes(self, message, camera_name=''):
         with self._diagnostics.receiving('3D boxes'):
-            self._stage.add_boxes(message, arrival_clock_ns(), camera)
+            self._stage.add_boxes(message, arrival_clock_ns(), camera_name)
 
     def _on_tracks(self, tracks, header):
         self._track_ids.reserve(tracks)

@@ -1,10 +1,17 @@
 """Pose of a camera that tf does not contain, from the floor in its depth images."""
+from typing import Any, List, Optional
+
+import numpy as np
+from sensor_msgs.msg import CameraInfo, Image
+
+
+from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.images import mounted_camera, turned_camera, turned_depth, turns_for
 from ros_3d_bb.conversions.camera_msgs import RAW
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
 from ros_3d_bb.conversions.perception_msgs import camera_from_msg, stamp_of
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.detection.depth.ground_plane import camera_pose_above, fit_floor
+from ros_3d_bb.detection.depth.ground_plane import CameraPose, Floor, camera_pose_above, fit_floor
 
 FLOOR = 'floor'  # value of the option and the launch argument camera_pose
 POSE_FITTED = 'poses fitted to the floor'  # event
@@ -20,16 +27,18 @@ class CameraPoseStage(object):
     ~depth_scale, ~frame_id and ~image_rotation.
     """
 
-    def __init__(self, params):
-        self._params, self._turns, self._camera = params, turns_for(params.image_rotation, None), None
-        self._floors, self._used_ns = [], None
+    def __init__(self, params: Any) -> None:
+        self._params, self._turns = params, turns_for(params.image_rotation, None)
+        self._camera: Optional[Camera] = None
+        self._used_ns: Optional[int] = None
+        self._floors: List[Floor] = []
         self.frame_id = ''  # optical frame of the depth images
 
-    def add_camera_info(self, message):
+    def add_camera_info(self, message: CameraInfo) -> None:
         """Add a sensor_msgs/CameraInfo of the depth images. Raises ValueError if it is invalid."""
         self._camera = camera_from_msg(message)
 
-    def add_depth(self, message):
+    def add_depth(self, message: Image) -> Optional[bool]:
         """Add a sensor_msgs/Image of depth. Images before the first camera_info, and most others, are skipped.
 
         Returns whether the floor is visible; None if the image is skipped. Raises ValueError if it is invalid.
@@ -49,17 +58,17 @@ class CameraPoseStage(object):
         return floor is not None
 
     @property
-    def is_complete(self):
+    def is_complete(self) -> bool:
         """Whether `IMAGES` images show the floor."""
         return len(self._floors) >= IMAGES
 
     @property
-    def pose(self):
+    def pose(self) -> Optional[CameraPose]:
         """The `ground_plane.CameraPose`; None if no image shows the floor."""
         return camera_pose_above(self._floors) if self._floors else None
 
     @property
-    def floor_from_camera(self):
+    def floor_from_camera(self) -> Optional[np.ndarray]:
         """Pose (4, 4) of `frame_id` in a frame on the floor below the camera, z up and x ahead; None if no image shows
         the floor."""
         pose = self.pose

@@ -1,9 +1,13 @@
 """Register raw depth messages, with the camera_info of the depth camera and the transform between both cameras."""
 import numpy as np
 import tf2_ros
+from sensor_msgs.msg import CameraInfo
 
+from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.camera.registration import Registration
 from ros_3d_bb.conversions.perception_msgs import NEWEST, camera_from_msg
+from ros_3d_bb.pipeline.transform_buffer import TransformBuffer
 
 
 class DepthRegistration(object):
@@ -13,15 +17,15 @@ class DepthRegistration(object):
     each other. `info_topic`, that of the depth camera's camera_info, is named in the error message if it is missing.
     """
 
-    def __init__(self, transforms, info_topic):
+    def __init__(self, transforms: TransformBuffer, info_topic: str) -> None:
         self._transforms, self._info_topic, self._depth_camera = transforms, info_topic, None
         self._geometry = None
 
-    def add_camera_info(self, message):
+    def add_camera_info(self, message: CameraInfo) -> None:
         """Add a sensor_msgs/CameraInfo of the depth camera; it is used for all images until the next."""
         self._depth_camera = camera_from_msg(message)
 
-    def geometry(self, depth, depth_frame, color_camera, color_frame):
+    def geometry(self, depth: DepthImage, depth_frame: str, color_camera: Camera, color_frame: str) -> Registration:
         """Return the Registration for a DepthImage, given the optical frames of both cameras.
 
         Raises ValueError if there is no camera_info of depth, it has another size, or the transform is missing.

@@ -1,18 +1,23 @@
 """Detection stage: 2D bounding boxes in frames or colour images."""
 import math
-from typing import NamedTuple
+from typing import Any, Callable, NamedTuple, Optional, Tuple
 
+import numpy as np
 import tf2_ros
+from sensor_msgs.msg import Image
 
 from ros_3d_bb.camera.camera_model import transform_from
-from ros_3d_bb.camera.images import AUTO, turned_boxes, turned_image, turns_for
+from ros_3d_bb.camera.images import AUTO, RgbdFrame, turned_boxes, turned_image, turns_for
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import stamp_of
+from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.params import (DEPTH, DEPTH_SCALE, ENABLED, IMAGE_ROTATION, PUBLISH_EMPTY, STAMP_TOLERANCE, Param,
                                    parameters)
+from ros_3d_bb.detection.boxes import Detections
 from ros_3d_bb.detection.depth.detector import DepthPeople
-from ros_3d_bb.detection.depth.ground_plane import camera_pose_above, floor_from_transform
-from ros_3d_bb.pipeline.transform_buffer import upright_transform
+from ros_3d_bb.detection.depth.ground_plane import CameraPose, camera_pose_above, floor_from_transform
+from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
+from ros_3d_bb.pipeline.transform_buffer import TransformBuffer, upright_transform
 
 
 @parameters()
@@ -44,7 +49,7 @@ class DepthDetectorParams(NamedTuple):
     publish_empty: bool = PUBLISH_EMPTY
 
 
-def detect_in_color(detector, message, turns=0):
+def detect_in_color(detector: Any, message: Image, turns: int = 0) -> Tuple[np.ndarray, Detections]:
     """Return a colour image as RGB, (height, width, 3), and the Detections of a `NetworkDetector` in it.
 
     The detector receives the image upright, after `turns` clockwise quarter turns. Raises ValueError if the image or
@@ -65,14 +70,14 @@ class CameraRotation(object):
     ~floor_frame. `on_known` is called once no further lookups are necessary.
     """
 
-    def __init__(self, params, transforms, on_known=lambda: None):
+    def __init__(self, params: Any, transforms: TransformBuffer, on_known: Callable[[], Any] = lambda: None) -> None:
         self._params, self._transforms, self._on_known = params, transforms, on_known
         self._turns = None
         if params.image_rotation != AUTO or not params.floor_frame:
             self._turns = turns_for(params.image_rotation, None)
             on_known()
 
-    def turns(self, frame_id):
+    def turns(self, frame_id: str) -> int:
         """Clockwise quarter turns of the images, whose header has this frame; 0 while they are unknown."""
         if self._turns is None:
             try:
@@ -93,15 +98,15 @@ class DepthDetectionStage(object):
 
     names = ('person',)
 
-    def __init__(self, params, people, events):
+    def __init__(self, params: DepthDetectorParams, people: DepthPeopleParams, events: EventCounter) -> None:
         self._params, self._events, self._detector = params, events, DepthPeople(people)
 
-    def reconfigure(self, params, people):
+    def reconfigure(self, params: DepthDetectorParams, people: DepthPeopleParams) -> None:
         """Change the parameters. If they are invalid, raise ValueError and keep the old ones."""
         self._detector.reconfigure(people)
         self._params = params
 
-    def detect(self, frame):
+    def detect(self, frame: RgbdFrame) -> Optional[Detections]:
         """Return the Detections in the received image of an RgbdFrame; None while the floor is unknown."""
         floor = None  # the detector fits it
         if frame.camera_from_floor is not None and frame.is_floor_known:
@@ -120,6 +125,6 @@ class DepthDetectionStage(object):
         return detections._replace(boxes=frame.received_rects(detections.boxes))
 
 
-def _described(pose):
+def _described(pose: CameraPose) -> str:
     return 'a camera %.2f m above the floor, tilted by %.1f and rolled by %.1f degrees' % (
         pose.height_m, math.degrees(pose.tilt_rad), math.degrees(pose.roll_rad))

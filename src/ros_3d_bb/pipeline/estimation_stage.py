@@ -2,22 +2,23 @@
 import functools
 import itertools
 from collections import Counter, deque
-from typing import NamedTuple
+from typing import Any, Deque, Dict, Iterable, List, NamedTuple, Optional
 
 import numpy as np
 
-from ros_3d_bb.camera.images import turned_rotation
+from ros_3d_bb.camera.images import RgbdFrame, turned_rotation
+from ros_3d_bb.conversions.perception_msgs import Boxes2D
+from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.object_classes import PERSON, PERSON_CLASS, read_object_classes
 from ros_3d_bb.core.params import (CLASSES_FILE, DEPTH, DEPTH_SCALE, IMAGE_ROTATION, LARGEST, STAMP_TOLERANCE, Param,
                                    parameters)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.appearance import appearance_of
-from ros_3d_bb.estimation.box3d import REASONS, Rejected
+from ros_3d_bb.estimation.box3d import Box3D, Rejected
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, error_model_of_param
 
 APPEARANCE_NS = NS // 10  # chosen: at 30 Hz, colours would take nearly as long as positions (0.25 of 0.31 ms a person)
-REJECTIONS = REASONS  # events of 2D boxes without a 3D box
 # Check of the scale of depth images.
 LATEST_PEOPLE = 20  # people that must agree
 LEAST_SUPPORT = 0.3  # boxes with less are often those of other objects
@@ -64,20 +65,20 @@ class EstimationStage(object):
     Raises ValueError if one of the `params`, Bbox3dParams, is invalid.
     """
 
-    def __init__(self, params, events):
+    def __init__(self, params: Bbox3dParams, events: EventCounter) -> None:
         self._events, self._scale_check, self._colored_ns = events, ScaleCheck(), -APPEARANCE_NS
         self._classes = read_object_classes(params.classes_file)
         self._error_model = error_model_of_param(params.error_model)
         self.reconfigure(params)
 
-    def reconfigure(self, params):
+    def reconfigure(self, params: Bbox3dParams) -> None:
         """Use another estimator or stride for the next boxes. If invalid, raise ValueError and keep the old one."""
         estimator = estimator_named(params.estimator, params.stride, self._classes)
         if self._error_model is not None:
             self._error_model.check_estimator(params.estimator)
         self.estimator = estimator
 
-    def estimate(self, frame, boxes2d):
+    def estimate(self, frame: RgbdFrame, boxes2d: Boxes2D) -> List[Box3D]:
         """Estimate the 3D boxes of one image from its RgbdFrame and Boxes2D.
 
         A 2D box yields no 3D box if it is empty or reversed, is Rejected, or gives an implausible size.
@@ -87,7 +88,8 @@ class EstimationStage(object):
         rects_px = list(map(tuple, frame.upright_rects(usable.boxes).tolist()))
         estimates = estimate_boxes(frame.depth, rects_px, frame.camera, self.estimator, _level_rotation(frame.up),
                                    usable.labels)
-        found, boxes3d, counts = [], [], Counter()
+        found, boxes3d = [], []
+        counts: Dict[str, int] = Counter()
         for box, score in zip(estimates, usable.scores.tolist()):
             if isinstance(box, Rejected):
                 counts[box.reason] += 1
@@ -110,7 +112,7 @@ class EstimationStage(object):
         self._events.count_all(counts)
         return [_as_received(box, frame) for box in boxes3d] if frame.turns else boxes3d
 
-    def _with_appearance(self, boxes3d, frame):
+    def _with_appearance(self, boxes3d: List[Box3D], frame: RgbdFrame) -> List[Box3D]:
         """The boxes with the colours of people, of some images only: clothes do not change."""
         if frame.color is None or abs(frame.stamp_ns - self._colored_ns) < APPEARANCE_NS:
             return boxes3d
@@ -118,39 +120,40 @@ class EstimationStage(object):
         return [box._replace(appearance=appearance_of(box, frame.color, frame.depth, frame.camera))
                 if box.label == PERSON else box for box in boxes3d]
 
-    def _warn_of_size(self, box):
+    def _warn_of_size(self, box: Box3D) -> None:
         self._events.warn('boxes of impossible size', '2D box (%d, %d, %d, %d) gives a 3D box %.3g m wide and %.3g m '
                           'high at %.3g m; less than %g and %g m expected; the others in this image are used'
                           % (box.rect_px + (box.size_m[0], box.size_m[1], box.center_m[2]) + box.largest_m))
 
-    def _warn_of_scale(self, factor, unit_m):
+    def _warn_of_scale(self, factor: float, unit_m: float) -> None:
         self._events.warn('depth of a wrong scale', 'people of impossible height: depth must be multiplied by %g; '
                           'set ~depth_scale: %g (now %g); 3D boxes are wrong or missing until then'
                           % (factor, factor * unit_m, unit_m))
 
-    def _usable_boxes(self, boxes2d):
+    def _usable_boxes(self, boxes2d: Boxes2D) -> Boxes2D:
         """Return the Boxes2D whose rectangles are neither empty nor reversed."""
         boxes = boxes2d.boxes
         is_usable = (boxes[:, 0] < boxes[:, 2]) & (boxes[:, 1] < boxes[:, 3])
         for rect_px in boxes[~is_usable].tolist():
             self._events.warn('boxes rejected', '2D box (%d, %d, %d, %d) is empty or reversed: x1 < x2 and y1 < y2 '
                               'expected; the others in this image are used' % tuple(rect_px))
-        return boxes2d._replace(boxes=boxes[is_usable], labels=list(itertools.compress(boxes2d.labels, is_usable)),
+        return boxes2d._replace(boxes=boxes[is_usable], labels=tuple(itertools.compress(boxes2d.labels, is_usable)),
                                 scores=boxes2d.scores[is_usable])
 
 
-def _as_received(box, frame):
+def _as_received(box: Box3D, frame: RgbdFrame) -> Box3D:
     """Convert a Box3D of the upright image to the optical frame and the pixels of the image as received."""
     received_from_upright = turned_rotation(frame.turns).T
     (rect_px,) = frame.received_rects(np.array([box.rect_px])).tolist()
     size_m, largest_m = box.size_m, box.largest_m
+    edges: Any = box.truncated_edges
     if frame.turns % 2:
         size_m, largest_m = size_m[[1, 0, 0]], largest_m[::-1]
     covariance_m2 = box.covariance_m2
     if covariance_m2 is not None:
         covariance_m2 = received_from_upright.dot(covariance_m2).dot(received_from_upright.T)
     return box._replace(center_m=received_from_upright.dot(box.center_m), size_m=size_m, rect_px=tuple(rect_px),
-                        truncated_edges=box.truncated_edges[frame.turns:] + box.truncated_edges[:frame.turns],
+                        truncated_edges=edges[frame.turns:] + edges[:frame.turns],
                         covariance_m2=covariance_m2, largest_m=largest_m)
 
 
@@ -161,10 +164,10 @@ class ScaleCheck(object):
     Three quarters of the heights must be too large, or too small.
     """
 
-    def __init__(self):
-        self._heights_m = deque(maxlen=LATEST_PEOPLE)
+    def __init__(self) -> None:
+        self._heights_m: Deque[float] = deque(maxlen=LATEST_PEOPLE)
 
-    def factor(self, boxes):
+    def factor(self, boxes: Iterable[Box3D]) -> Optional[float]:
         """Add the `Box3D`s of one image, plausible or not.
 
         Returns
@@ -188,7 +191,7 @@ class ScaleCheck(object):
         return common if is_common else float('%.2g' % factor)
 
 
-def _shows_standing_person(box):
+def _shows_standing_person(box: Box3D) -> bool:
     x1, y1, x2, y2 = box.rect_px
     is_supported = box.support >= LEAST_SUPPORT or box.size_m[1] > HEIGHTS_M[1]  # a giant is deeper than a body's layer
     return box.label == PERSON and not box.truncated and is_supported and y2 - y1 >= LEAST_ASPECT * (x2 - x1)

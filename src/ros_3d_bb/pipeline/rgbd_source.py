@@ -1,17 +1,26 @@
 """Source of the frames of one RGB-D camera: pairs its messages by stamp, and registers and turns the images."""
+from typing import Any, Callable, List, Optional, Sequence, Tuple, Union
+
+import numpy as np
 import tf2_ros
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Int32MultiArray
 
 from ros_3d_bb.camera.alignment import ALIGN, info_size_fault, size_fault
-from ros_3d_bb.camera.images import RgbdFrame, turns_for
+from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.images import DepthImage, RgbdFrame, turns_for
 from ros_3d_bb.camera.registration import RegisteredDepth
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, INFO_TOPICS, RAW
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (Boxes2D, boxes2d_from_msg, camera_from_msg, stamp_if_any,
                                                    stamp_of)
-from ros_3d_bb.core.time_sync import NS, RECENT, StampSynchronizer, half_period_of
+from ros_3d_bb.core.event_counter import EventCounter
+from ros_3d_bb.core.time_sync import NS, RECENT, StampSynchronizer, Stamped, half_period_of
 from ros_3d_bb.pipeline.depth_registration import DepthRegistration
-from ros_3d_bb.pipeline.transform_buffer import upright_transform
+from ros_3d_bb.pipeline.transform_buffer import TransformBuffer, upright_transform
 
+Trigger = Union[Boxes2D, Image]  # what is paired with depth
+OnMatch = Callable[[Trigger, Image, Camera], Any]
 UNSTAMPED = '2D boxes without a stamp'  # event, reported once
 USED = 'images with a used depth image'  # counter
 TILT_UNKNOWN = 'tilt of the camera unknown'  # event, reported once
@@ -31,38 +40,41 @@ class RgbdSource(object):
     `assumed_delay_s` are for the StampSynchronizer.
     """
 
-    def __init__(self, params, events, on_match, transforms=None, topics=DEPTH_TOPICS['aligned'] + INFO_TOPICS[:1],
-                 cache_s=1.0, assumed_delay_s=0.0):
-        self._params, self._events, self._transforms = params, events, transforms
+    def __init__(self, params: Any, events: EventCounter, on_match: OnMatch,
+                 transforms: Optional[TransformBuffer] = None,
+                 topics: Sequence[str] = DEPTH_TOPICS['aligned'] + INFO_TOPICS[:1], cache_s: float = 1.0,
+                 assumed_delay_s: float = 0.0) -> None:
+        self._params, self._events, self._transforms = params, events, transforms or TransformBuffer()
         self._depth_topic, depth_info_topic, self._info_topic = topics
-        self._registration = DepthRegistration(transforms, depth_info_topic) if params.depth == RAW else None
+        self._registration = DepthRegistration(self._transforms, depth_info_topic)
         self._color_frame, self._cache_s = '', cache_s
         self._sync = StampSynchronizer(int(cache_s * NS), int(params.stamp_tolerance * NS), int(assumed_delay_s * NS),
                                        self._on_frame, self._on_lost)
-        self._on_match, self._used_ns = on_match, None
-        self._recent_ns, self._held = [], None
+        self._on_match, self._used_ns = on_match, 0
+        self._recent_ns: List[int] = []
+        self._held: Optional[Tuple[Stamped, Stamped, Camera]] = None
 
-    def set_assumed_delay(self, delay_s):
+    def set_assumed_delay(self, delay_s: float) -> None:
         """Set the latency of the detector, for 2D boxes without a stamp."""
         self._sync.assumed_delay_ns = int(delay_s * NS)
 
-    def add_camera_info(self, message, now_ns):
+    def add_camera_info(self, message: CameraInfo, now_ns: int) -> None:
         """Add a sensor_msgs/CameraInfo of the colour camera."""
         camera = camera_from_msg(message)
         self._color_frame = message.header.frame_id
         self._sync.add_camera(stamp_if_any(message), now_ns, camera)
 
-    def add_depth_camera_info(self, message, _now_ns):
+    def add_depth_camera_info(self, message: CameraInfo, _now_ns: int) -> None:
         """Add a sensor_msgs/CameraInfo of the depth camera, for raw depth."""
         self._registration.add_camera_info(message)
 
-    def add_depth(self, message, now_ns):
+    def add_depth(self, message: Image, now_ns: int) -> None:
         self._sync.add_depth(stamp_of(message), now_ns, message)
 
-    def add_color(self, message, now_ns):
+    def add_color(self, message: Image, now_ns: int) -> None:
         self._sync.add_boxes(stamp_of(message), now_ns, message)
 
-    def add_boxes(self, message, now_ns, color=None):
+    def add_boxes(self, message: Int32MultiArray, now_ns: int, color: Optional[np.ndarray] = None) -> None:
         """Add 2D boxes, a std_msgs/Int32MultiArray, with their image, RGB (height, width, 3), if it is known."""
         boxes2d = boxes2d_from_msg(message)._replace(color=color)
         if boxes2d.stamp_ns is None:
@@ -71,14 +83,14 @@ class RgbdSource(object):
         self._events.count('arrays of 2D boxes')
         self._sync.add_boxes(boxes2d.stamp_ns, now_ns, boxes2d)
 
-    def end(self):
+    def end(self) -> None:
         """Report what still waits for its depth image. Call at the end of the input."""
         self._sync.end()
         if self._held is not None:
             self._pass_on(*self._held)
             self._held = None
 
-    def frame(self, trigger, depth_msg, camera):
+    def frame(self, trigger: Trigger, depth_msg: Image, camera: Camera) -> RgbdFrame:
         """Return the RgbdFrame of matched messages: the colour image, or the Boxes2D in it (the frame then has
         its colour only if they do); the depth image; and the Camera.
 
@@ -101,9 +113,9 @@ class RgbdSource(object):
                           camera_from_floor=camera_from_floor, is_floor_known=is_floor_known)
         return frame.turned(turns_for(self._params.image_rotation, frame.up))
 
-    def _aligned(self, depth, depth_frame, camera):
+    def _aligned(self, depth: DepthImage, depth_frame: str, camera: Camera) -> Tuple[Any, str]:
         """Return a depth image with the pixels of colour, and the frame of the colour camera."""
-        if self._registration is not None:
+        if self._params.depth == RAW:
             frame_id = self._params.frame_id or self._color_frame
             registration = self._registration.geometry(depth, depth_frame, camera, frame_id)
             return RegisteredDepth(depth, registration), frame_id
@@ -112,14 +124,14 @@ class RgbdSource(object):
             raise ValueError('%s; depth must be aligned to colour: %s' % (size_fault(camera, width, height), ALIGN))
         return depth, self._params.frame_id or depth_frame
 
-    def _camera_from_floor(self, frame_id):
+    def _camera_from_floor(self, frame_id: str) -> Tuple[Optional[np.ndarray], bool]:
         """Return the transform (4, 4) to the optical frame from ~floor_frame, or from the root of tf without it, and
         whether it is that from ~floor_frame; None and False if it is unknown.
 
         The latest transform is used: the camera is fixed to the robot, so no wait for the image stamp is necessary.
         """
         wanted = self._params.floor_frame
-        if self._transforms is None or not wanted:
+        if not wanted:
             return None, False
         try:
             floor_frame, camera_from_floor = upright_transform(self._transforms, wanted, frame_id)
@@ -135,11 +147,11 @@ class RgbdSource(object):
                             'depth fits the floor to the depth image' % (wanted, frame_id, floor_frame))
         return camera_from_floor, floor_frame == wanted
 
-    def _note_once(self, event, sentence):
+    def _note_once(self, event: str, sentence: str) -> None:
         if event not in self._events.counts:
             self._events.note(event, sentence)
 
-    def _on_frame(self, trigger, depth, camera):
+    def _on_frame(self, trigger: Stamped, depth: Stamped, camera: Camera) -> None:
         """Pass matched messages on, but only once if a depth image is nearest to several colour images: positions have
         its stamp. A colour image before it is held back if the next one should be nearer to it."""
         gap_ns, held, self._held = depth.stamp_ns - trigger.stamp_ns, self._held, None
@@ -157,19 +169,19 @@ class RgbdSource(object):
         else:
             self._pass_on(trigger, depth, camera)
 
-    def _pass_on(self, trigger, depth, camera):
+    def _pass_on(self, trigger: Stamped, depth: Stamped, camera: Camera) -> None:
         self._used_ns = depth.stamp_ns
         self._on_match(trigger.value, depth.value, camera)
 
-    def _on_lost(self, trigger, before_jump):
-        inputs = '2D boxes' if isinstance(trigger.value, Boxes2D) else 'colour images'
+    def _on_lost(self, trigger: Trigger, stamp_ns: Optional[int], before_jump: bool) -> None:
+        inputs = '2D boxes' if isinstance(trigger, Boxes2D) else 'colour images'
         if before_jump:
             self._events.count('%s from before a time jump' % inputs)
             return
         with self._events.rejecting(inputs):
-            raise ValueError(self._why_lost(trigger.stamp_ns))
+            raise ValueError(self._why_lost(stamp_ns))
 
-    def _why_lost(self, stamp_ns):
+    def _why_lost(self, stamp_ns: Optional[int]) -> str:
         """Return an error message that names the missing input and its topic."""
         newest_ns = self._sync.newest_ns
         if newest_ns is None:

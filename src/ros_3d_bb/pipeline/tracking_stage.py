@@ -1,37 +1,35 @@
 """Tracking stage: tracks from 3D boxes and transforms, shared by tracker_node and process_bag."""
 import collections
-import functools
 import re
 import threading
-from typing import NamedTuple
+from typing import Any, Callable, Deque, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 import tf2_ros
+from nav_msgs.msg import OccupancyGrid
 from std_msgs.msg import Header
 
 from ros_3d_bb.camera.alignment import POSE, target_frame_fault, viewing_fault
-from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, RAW, topic_of
-from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
-from ros_3d_bb.conversions.perception_msgs import (camera_from_msg, occupied_from_msg, stamp_of, time_from,
-                                                   usable_boxes3d)
+from ros_3d_bb.conversions.perception_msgs import stamp_of, time_from, usable_boxes3d
 from ros_3d_bb.core.detector_model import DetectorModel
+from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.object_classes import read_object_classes
 from ros_3d_bb.core.params import (CLASSES_FILE, DEPTH, DEPTH_SCALE, SET_BY_LAUNCH, STAMP_TOLERANCE, NestedList, Param,
                                    parameters)
-from ros_3d_bb.core.time_sync import JITTER, NS, CameraClocks, MessageCache, median_period_ns
+from ros_3d_bb.core.time_sync import JITTER, NS, CameraClocks, median_period_ns
 from ros_3d_bb.estimation.error_model import error_model_of_param
-from ros_3d_bb.pipeline.depth_registration import DepthRegistration
-from ros_3d_bb.pipeline.tracking_frame import AUTO, TrackingFrame, transformed
-from ros_3d_bb.tracking.ignored_areas import IgnoredAreas, polygons_from
+from ros_3d_bb.pipeline.camera_views import CameraViews
+from ros_3d_bb.pipeline.ignored_places import IgnoredPlaces, areas_of
+from ros_3d_bb.pipeline.tracking_frame import AUTO, ImagePose, TrackingFrame, transformed
+from ros_3d_bb.pipeline.transform_buffer import TransformBuffer
 from ros_3d_bb.tracking.manoeuvres import LONGEST_NS
 from ros_3d_bb.tracking.measurement_model import NoiseParams
-from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.track import PredictionParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
-from ros_3d_bb.tracking.types import CameraView, detections_from_boxes
+from ros_3d_bb.tracking.types import TrackedObject, detections_from_boxes
 
 TRACKING_PARAMS = TrackerParams, NoiseParams, PredictionParams
+TrackingParams = Tuple[TrackerParams, NoiseParams, PredictionParams]
 AHEAD, BEHIND = 'images ahead of other cameras', 'images behind other cameras'  # counters
 CONTRADICTION = 'cameras that contradict each other'  # event, reported once
 TOO_SLOW = 'rate of images too low'  # event, reported once
@@ -77,24 +75,26 @@ class TrackerNodeParams(NamedTuple):
 class TrackingStage(object):
     """Track 3D boxes in the frame of a `tracking_frame.TrackingFrame`, and convert the tracks to ~target_frame.
 
-    If there is no transform at the stamp of the boxes, there is no result and tracks do not age. Each message is passed
-    with the namespace of its camera, '' for a single one; boxes and depth images also with their arrival time `now_ns`
-    (integer nanoseconds) on a clock chosen by the caller. The methods are thread-safe. The constructor and
-    `reconfigure` raise ValueError if a parameter is invalid.
+    If there is no transform at the stamp of the boxes, there is no result and tracks do not age. The name of a camera
+    is its namespace, '' for a single one. Boxes and depth images are passed with their arrival time `now_ns` (integer
+    nanoseconds) on a clock chosen by the caller. The methods are thread-safe. The constructor and `reconfigure` raise
+    ValueError if a parameter is invalid.
 
     `tracking` has one instance of each of `TRACKING_PARAMS`. The method `lookup(target_frame, source_frame, stamp)` of
     `transforms` returns target_from_source (4, 4) or raises tf2_ros.TransformException. `on_tracks` is called with the
     tracks (list of `types.TrackedObject`) after each image and their header, which has the newest stamp and the target
     frame; `lock` is held meanwhile. The IDs of tracks are greater than `last_id`.
 
-    Attributes: `cameras`, the namespaces of the cameras; and `lock`.
+    Attributes: `views`, the `camera_views.CameraViews` of each camera, by its name; and `lock`.
     """
 
-    def __init__(self, params, tracking, events, transforms, on_tracks, last_id=0):
+    def __init__(self, params: TrackerNodeParams, tracking: TrackingParams, events: EventCounter,
+                 transforms: TransformBuffer, on_tracks: Callable[[List[TrackedObject], Header], Any],
+                 last_id: int = 0) -> None:
         _check(params)
         params = params._replace(target_frame=params.target_frame.lstrip('/'))  # tf2 rejects frames with a slash
         self._params, self._events, self._on_tracks = params, events, on_tracks
-        self.cameras = tuple(params.cameras) or ('',)
+        self.views = {name: CameraViews(params, events, transforms, name) for name in params.cameras or ('',)}
         self._classes = read_object_classes(params.classes_file)
         model = error_model_of_param(params.error_model)
         self._tracker = Tracker(*tracking, last_id=last_id, classes=self._classes,
@@ -102,91 +102,64 @@ class TrackingStage(object):
         self.lock = threading.RLock()
         self._clocks = CameraClocks()
         self._jumps = 0  # number of backward jumps in time
-        self._boxes_ns = {}  # newest stamp of tracked boxes, by camera
-        self._recent_ns = {camera: collections.deque(maxlen=RECENT) for camera in self.cameras}  # stamps of boxes
-        self._frames, self._intrinsics = {}, {}  # by camera
+        self._boxes_ns: Dict[str, int] = {}  # newest stamp of tracked boxes, by camera
+        self._recent_ns: Dict[str, Deque[int]] = {  # stamps of boxes
+            name: collections.deque(maxlen=RECENT) for name in self.views}
+        self._frames: Dict[str, str] = {}  # by camera
         self._frame = TrackingFrame(transforms, params.tracking_frame, params.target_frame)
-        self._areas = _areas_of(params)
-        self._poses = {}  # latest CameraPose, by camera
-        self._newest_pose = None
-        self._depths = {camera: MessageCache(int(params.depth_cache_length * NS)) for camera in self.cameras}
-        self._registrations = {camera: DepthRegistration(transforms, topic_of(camera, DEPTH_TOPICS[RAW][1]))
-                               for camera in self.cameras if params.depth == RAW}
+        self._ignored = IgnoredPlaces(params, events)
+        self._poses: Dict[str, ImagePose] = {}  # latest one, by camera
+        self._newest_pose: Optional[ImagePose] = None
 
-    def reconfigure(self, params, tracking):
+    def reconfigure(self, params: TrackerNodeParams, tracking: TrackingParams) -> None:
         """Use other tracking parameters and ignored areas for the next boxes; tracks are kept, except those in other
         areas than before. Raises ValueError as the constructor, without any change."""
-        areas = _areas_of(params)._replace(occupied=self._areas.occupied)
+        areas = areas_of(params)
         with self.lock:
             self._tracker.reconfigure(*tracking)
-            if areas.differs_from(self._areas):
-                self._ignore(areas)
+            if self._ignored.use(areas):
+                self._end_ignored()
 
     @property
-    def ignored_areas(self):
+    def ignored_areas(self) -> Sequence[np.ndarray]:
         """Polygons, arrays (n, 2) in the target frame, in which no track starts."""
-        return self._areas.polygons
+        return self._ignored.polygons_m
 
     @property
-    def views_m(self):
+    def views_m(self) -> List[np.ndarray]:
         """Outlines, arrays (3, 2) in the target frame, of the fields of view of the cameras."""
-        return [CameraView(pose.target_from_camera, self._intrinsics[camera]).outline(SHOWN_RANGE_M)
-                for camera, pose in sorted(self._poses.items()) if camera in self._intrinsics]
+        outlines_m = (self.views[name].outline_m(pose.target_from_camera, SHOWN_RANGE_M)
+                      for name, pose in sorted(self._poses.items()))
+        return [outline_m for outline_m in outlines_m if outline_m is not None]
 
-    def set_map(self, message):
+    def set_map(self, message: OccupancyGrid) -> None:
         """Start no tracks in the occupied cells of a nav_msgs/OccupancyGrid. With the first one, those there end.
 
         Raises ValueError if it is in another frame than the published tracks.
         """
-        if message.header.frame_id.lstrip('/') != self._params.target_frame:
-            raise ValueError('its frame is %r, and that of the tracks %r; the same expected, and no cells are ignored'
-                             % (message.header.frame_id, self._params.target_frame))
-        areas = self._areas._replace(occupied=occupied_from_msg(message))
+        cells = self._ignored.cells_of(message)
         with self.lock:
-            if self._areas.occupied is None:
-                self._ignore(areas)
-            self._areas = areas
+            if self._ignored.use_map(cells):
+                self._end_ignored()
 
-    def _ignore(self, areas):
-        """Use other IgnoredAreas. The tracks in them, which have started there, end."""
-        self._areas = areas
-        if self._newest_pose is None:
-            return
-        cameras_m = [pose.target_from_camera[:2, 3] for pose in self._poses.values()]
+    def _end_ignored(self) -> None:
+        """End the tracks in ignored places, which have started there."""
+        if self._newest_pose is not None:
+            self._tracker.delete_at(self._ignored.seen_from(self._poses.values(), self._newest_pose))
 
-        def is_ignored(place_m):
-            point_m, = self._newest_pose.in_target(np.array([place_m + (0.0,)]))
-            return any(areas.contains(point_m, camera_m) for camera_m in cameras_m)
-        self._tracker.delete_at(is_ignored)
-
-    def add_camera_info(self, message, camera=''):
-        """Add a sensor_msgs/CameraInfo. Raises ValueError if it is invalid."""
-        self._intrinsics[camera] = camera_from_msg(message)
-
-    def add_depth_camera_info(self, message, camera=''):
-        """Add a sensor_msgs/CameraInfo of the depth camera, for raw depth. Raises ValueError if it is invalid."""
-        self._registrations[camera].add_camera_info(message)
-
-    def add_depth(self, message, now_ns, camera=''):
-        """Add a depth image. Raises ValueError if it has no stamp; if it is invalid otherwise, it is counted."""
-        stamp_ns = stamp_of(message)
-        with self._events.rejecting('depth images'):
-            depth = imgmsg_to_depth(message, self._params.depth_scale)
-            self._depths[camera].add(stamp_ns, now_ns, (depth, message.header.frame_id))
-
-    def add_boxes(self, message, now_ns, camera=''):
+    def add_boxes(self, message: Any, now_ns: int, camera_name: str = '') -> None:
         """Process a BoundingBox3DArray: `on_tracks` is called unless the transform is missing, or the stamp is
         inconsistent with those of the other cameras. Raises ValueError if the message or each of its boxes is invalid,
         or the boxes are in the fixed frame.
         """
-        stamp_ns, camera_name = stamp_of(message), camera or message.header.frame_id
-        frame_id, target_frame = self._params.camera_frame or message.header.frame_id, self._params.target_frame
+        stamp_ns, target_frame = stamp_of(message), self._params.target_frame
+        frame_id = self._params.camera_frame or message.header.frame_id
         if not frame_id:
             raise ValueError('their images have no frame_id; set ~frame_id to the optical frame of the camera')
         if frame_id.lstrip('/') == target_frame:
             raise ValueError('%s (~target_frame); %s' % (target_frame_fault(target_frame, frame_id), POSE))
         with self.lock:
-            if not self._accept(stamp_ns, now_ns, camera):
+            if not self._accept(stamp_ns, now_ns, camera_name):
                 return
             jumps = self._jumps
         try:  # not under the lock: waiting for the transform of one camera must not delay the others
@@ -200,12 +173,12 @@ class TrackingStage(object):
             return
         with self.lock:
             if jumps == self._jumps:
-                self._track(message, stamp_ns, pose, camera, camera_name)
+                self._track(message, stamp_ns, pose, camera_name)
             else:
                 self._events.warn(BEHIND, 'boxes at %.3f are dropped: time jumped back while their transform was '
                                   'awaited' % (stamp_ns / NS))
 
-    def _track(self, message, stamp_ns, pose, camera, camera_name):
+    def _track(self, message: Any, stamp_ns: int, pose: ImagePose, camera_name: str) -> None:
         fault = viewing_fault(self._params.camera_frame or message.header.frame_id, pose.target_from_camera)
         if fault:
             self._tracker.skip(stamp_ns, camera_name)
@@ -216,27 +189,27 @@ class TrackingStage(object):
         if faults and not boxes:  # differs from an image without people
             self._tracker.skip(stamp_ns, camera_name)
             raise ValueError('none of their %d boxes is valid; tracks are kept as they are' % len(faults))
-        if camera:
-            self._check_frame(message.header.frame_id, camera)
+        if camera_name:
+            self._check_frame(message.header.frame_id, camera_name)
         untracked_boxes = self._tracker.untracked_boxes
-        detections = self._without_ignored(detections_from_boxes(boxes, pose.tracking_from_camera, self._classes), pose)
-        tracks = self._tracker.update(stamp_ns, detections,
-                                      self._view(message.header, pose.tracking_from_camera, camera, camera_name))
+        detections = detections_from_boxes(boxes, pose.tracking_from_camera, self._classes)
+        view = self.views[camera_name].view(message.header, pose.tracking_from_camera)
+        tracks = self._tracker.update(stamp_ns, self._ignored.marked(detections, pose), view)
         self._events.count('images tracked')
         untracked_boxes = self._tracker.untracked_boxes - untracked_boxes
         if untracked_boxes > 0:
             self._events.count('3D boxes that became no track', untracked_boxes)
-        if len(self.cameras) > 1 and CONTRADICTION not in self._events.counts:
+        if len(self.views) > 1 and CONTRADICTION not in self._events.counts:
             contradicting = self._tracker.contradicting_cameras
             if contradicting:
                 self._events.warn(CONTRADICTION, '%s and %s each detect another one of two tracks nearby, as if they '
                                   'showed one person in two places: check the poses of these cameras in tf'
                                   % contradicting)
-        newest_ns = self._clocks.track(stamp_ns, camera)
-        self._boxes_ns[camera], self._poses[camera] = stamp_ns, pose
-        if stamp_ns == newest_ns:
+        newest_ns = self._clocks.track(stamp_ns, camera_name)
+        self._boxes_ns[camera_name], self._poses[camera_name] = stamp_ns, pose
+        if stamp_ns == newest_ns or self._newest_pose is None:
             self._newest_pose = pose
-        self._check_rate(stamp_ns, camera)
+        self._check_rate(stamp_ns, camera_name)
         silent = self._silent_cameras(newest_ns)
         if silent:
             self._events.warn('tracks withheld', 'no boxes of %s were tracked within the last %g s (~camera_timeout): '
@@ -246,108 +219,60 @@ class TrackingStage(object):
         self._on_tracks(transformed(tracks, self._newest_pose.target_from_tracking),
                         Header(stamp=time_from(newest_ns), frame_id=self._params.target_frame))
 
-    def _without_ignored(self, detections, pose):
-        """Detections in the tracking frame, marked if they start no track."""
-        areas = self._areas
-        if not detections or not areas.polygons and areas.occupied is None:
-            return detections
-        camera_m = pose.target_from_camera[:2, 3]
-        places_m = pose.in_target(np.array([detection.position_m for detection in detections]))
-        detections = [detection._replace(is_ignored=areas.contains(place_m, camera_m))
-                      for detection, place_m in zip(detections, places_m)]
-        self._events.count('boxes in ignored areas', sum(detection.is_ignored for detection in detections))
-        return detections
-
-    def _check_rate(self, stamp_ns, camera):
+    def _check_rate(self, stamp_ns: int, camera_name: str) -> None:
         """Report images so far apart that the tracker assigns no boxes of people who move."""
-        recent_ns = self._recent_ns[camera]
+        recent_ns = self._recent_ns[camera_name]
         recent_ns.append(stamp_ns)
         period_ns = median_period_ns(list(recent_ns))
         if len(recent_ns) == RECENT and (1 + JITTER) * period_ns > LONGEST_NS and TOO_SLOW not in self._events.counts:
             self._events.warn(TOO_SLOW, '3D boxes arrive every %.2f s; less than %g s expected, or walking people are '
                               'not tracked; choose a faster detector' % (period_ns / NS, LONGEST_NS / NS))
 
-    def _silent_cameras(self, newest_ns):
+    def _silent_cameras(self, newest_ns: int) -> List[str]:
         """Names of the cameras whose newest boxes are older than ~camera_timeout."""
         timeout_s = self._params.camera_timeout or float('inf')
-        return [camera for camera in self.cameras
-                if newest_ns - self._boxes_ns.get(camera, float('-inf')) > timeout_s * NS]
+        return [name for name in self.views
+                if newest_ns - self._boxes_ns.get(name, float('-inf')) > timeout_s * NS]
 
-    def _view(self, header, tracking_from_camera, camera, camera_name):
-        """Return the CameraView of boxes with this header, with intrinsics and depth if they are known."""
-        view = CameraView(tracking_from_camera, self._intrinsics.get(camera), camera_name)
-        entry = self._depths[camera].matching(header.stamp.to_nsec(), int(self._params.stamp_tolerance * NS))
-        if view.intrinsics is None or entry is None:
-            return view
-        return self._with_depth(view, *entry.value, camera, header.frame_id)
-
-    def _with_depth(self, view, depth, depth_frame, camera, boxes_frame):
-        """Return a CameraView with a depth image; without one that cannot be used, which bbox3d_node reports."""
-        intrinsics = view.intrinsics
-        if camera not in self._registrations:
-            if depth.values.shape != (intrinsics.height, intrinsics.width):
-                return view
-            return view._replace(depth_at=functools.partial(depths_towards, intrinsics, depth),
-                                 measured_area=depth.measured_area)
-        try:
-            geometry = self._registrations[camera].geometry(depth, depth_frame, intrinsics,
-                                                            self._params.camera_frame or boxes_frame)
-        except ValueError:
-            return view
-        return view._replace(depth_at=functools.partial(_depths_from_beside, geometry, depth),
-                             measured_area=lambda: geometry.area_px)
-
-    def _accept(self, stamp_ns, now_ns, camera):
+    def _accept(self, stamp_ns: int, now_ns: int, camera_name: str) -> bool:
         """Whether the stamp of boxes is consistent with those of the other cameras. Handles backward jumps in time, as
         when a bag is looped or rewound: tracks are discarded."""
-        trusted = self._clocks.accept(stamp_ns, now_ns, camera)
+        trusted = self._clocks.accept(stamp_ns, now_ns, camera_name)
+        newest_ns = self._clocks.newest_ns or stamp_ns
         if trusted is not None:
-            newest_ns = self._clocks.newest_ns or stamp_ns
             self._events.warn(AHEAD if stamp_ns > newest_ns else BEHIND, 'boxes of %s at %.3f are dropped: their stamp '
                               'is %.3f s from the newest one, and %s has the correct time; they are tracked once that '
                               'camera agrees or ends'
-                              % (camera, stamp_ns / NS, (stamp_ns - newest_ns) / NS, trusted))
-        elif self._clocks.is_jump_back(stamp_ns, now_ns, camera):
+                              % (camera_name, stamp_ns / NS, (stamp_ns - newest_ns) / NS, trusted))
+        elif self._clocks.is_jump_back(stamp_ns, now_ns, camera_name):
             self._events.note('jumps back in time', 'time jumped back from %.3f to %.3f: earlier tracks are discarded'
-                              % (self._clocks.newest_ns / NS, stamp_ns / NS))
+                              % (newest_ns / NS, stamp_ns / NS))
             self._tracker.reset()
             self._clocks.restart()
             self._boxes_ns.clear()
             self._jumps += 1
         return trusted is None
 
-    def _check_frame(self, frame_id, camera):
+    def _check_frame(self, frame_id: str, camera_name: str) -> None:
         """Report cameras that share a frame, because tf then gives them the same position."""
-        if self._frames.get(camera) == frame_id:
+        if self._frames.get(camera_name) == frame_id:
             return
-        self._frames[camera] = frame_id
-        cameras = [other for other in self.cameras if self._frames.get(other) == frame_id]
-        if len(cameras) > 1:
+        self._frames[camera_name] = frame_id
+        sharing = [name for name in self.views if self._frames.get(name) == frame_id]
+        if len(sharing) > 1:
             self._events.note('cameras sharing a frame', 'the boxes of %s are all in the frame %s and are tracked as '
                               'if the cameras had the same pose; each camera needs its own frame'
-                              % (' and '.join(cameras), frame_id))
+                              % (' and '.join(sharing), frame_id))
 
 
-def _depths_from_beside(geometry, depth, points):
-    """As `depths_towards`, for raw depth: measured towards the points from the depth camera beside the view."""
-    points_there = transform_points(np.linalg.inv(geometry.color_from_depth), points)
-    share = depths_towards(geometry.depth_camera, depth, points_there) / points_there[:, 2]
-    beside_m = geometry.color_from_depth[2, 3]
-    return beside_m + share * (points[:, 2] - beside_m)
-
-
-def _areas_of(params):
-    return IgnoredAreas(polygons_from(params.ignored_areas), None, params.map_depth)
-
-
-def _check(params):
+def _check(params: TrackerNodeParams) -> None:
     if not params.target_frame:
         raise ValueError('parameter ~target_frame is empty; map or odom expected')
     fault = target_frame_fault(params.target_frame, params.camera_frame)
     if fault:
         raise ValueError('parameter ~target_frame: %s; %s' % (fault, POSE))
-    for camera in params.cameras:
-        if not (isinstance(camera, str) and NAMESPACE.match(camera)) or list(params.cameras).count(camera) > 1:
+    for name in params.cameras:
+        if not (isinstance(name, str) and NAMESPACE.match(name)) or list(params.cameras).count(name) > 1:
             raise ValueError('parameter ~cameras is %s; different namespaces expected, such as front, rear'
                              % list(params.cameras))
     if params.cameras and params.camera_frame:

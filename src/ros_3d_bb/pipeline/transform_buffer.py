@@ -1,8 +1,11 @@
 """tf2 buffer that accepts transforms again after a backward jump in time."""
 import collections
+from typing import Deque, Dict, List, Mapping, Set, Tuple
 
+import genpy
 import numpy as np
 import tf2_ros
+from geometry_msgs.msg import TransformStamped
 
 from ros_3d_bb.camera.alignment import viewing_fault
 from ros_3d_bb.conversions.perception_msgs import NEWEST, transform_from_msg
@@ -13,7 +16,7 @@ REJECTED = 2  # transforms in sequence that tf2 rejects after a jump, and not be
 MOST_RECENT = 1000  # recent transforms that are kept; chosen: some seconds of /tf of a Jackal, some megabytes
 
 
-def path_to_root(parents, frame):
+def path_to_root(parents: Mapping[str, str], frame: str) -> List[str]:
     """The frame and its ancestors, the root last; `parents` is {frame: parent}."""
     path = [frame]
     while path[-1] in parents and parents[path[-1]] not in path:
@@ -21,7 +24,7 @@ def path_to_root(parents, frame):
     return path
 
 
-def upright_transform(transforms, floor_frame, camera_frame):
+def upright_transform(transforms: 'TransformBuffer', floor_frame: str, camera_frame: str) -> Tuple[str, np.ndarray]:
     """Return a frame whose z axis points up, and the latest transform (4, 4) from it to a camera: `floor_frame`, or,
     without a transform from it, the root of the tree of the camera, such as map or odom of a robot without base_link.
 
@@ -47,17 +50,19 @@ class TransformBuffer(tf2_ros.BufferCore):
     another time than that of the lookup, have no effect, as in tf2.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         tf2_ros.BufferCore.__init__(self)
-        self._parents = {}
+        self._parents: Dict[str, str] = {}
         self._start()
 
-    def _start(self):
-        self._newest_s, self._rejected_before_s = {}, {}  # by child frame
-        self._rejected = {}  # number of rejected transforms in sequence, and stamp of the latest one, by child frame
-        self._recent = collections.deque(maxlen=MOST_RECENT)  # (transform, authority), also rejected ones
+    def _start(self) -> None:
+        # By child frame; of the rejected transforms in sequence, number and stamp of the latest one.
+        self._newest_s: Dict[str, float] = {}
+        self._rejected_before_s: Dict[str, float] = {}
+        self._rejected: Dict[str, Tuple[int, float]] = {}
+        self._recent: Deque[Tuple[TransformStamped, str]] = collections.deque(maxlen=MOST_RECENT)  # also rejected ones
 
-    def set_transform(self, transform, authority):
+    def set_transform(self, transform: TransformStamped, authority: str) -> None:
         """Add a TransformStamped."""
         child, stamp_s = _child_of(transform), transform.header.stamp.to_sec()
         newest_s = self._newest_s[child] = max(stamp_s, self._newest_s.get(child, stamp_s))
@@ -70,17 +75,17 @@ class TransformBuffer(tf2_ros.BufferCore):
         self._parents[child] = transform.header.frame_id.lstrip('/')
         tf2_ros.BufferCore.set_transform(self, transform, authority)
 
-    def set_transform_static(self, transform, authority):
+    def set_transform_static(self, transform: TransformStamped, authority: str) -> None:
         """Add a TransformStamped of tf_static."""
         self._parents[_child_of(transform)] = transform.header.frame_id.lstrip('/')
         tf2_ros.BufferCore.set_transform_static(self, transform, authority)
 
-    def clear(self):
+    def clear(self) -> None:
         """Remove all transforms except static ones."""
         tf2_ros.BufferCore.clear(self)
         self._start()
 
-    def lookup(self, target_frame, source_frame, stamp):
+    def lookup(self, target_frame: str, source_frame: str, stamp: genpy.Time) -> np.ndarray:
         """Look up `target_from_source`, a 4x4 matrix, at a stamp. Raises tf2_ros.TransformException."""
         target, source = target_frame.lstrip('/'), source_frame.lstrip('/')
         try:
@@ -92,11 +97,11 @@ class TransformBuffer(tf2_ros.BufferCore):
         self._clear_after(stamp.to_sec() + CACHE_S)
         return transform_from_msg(self.lookup_transform_core(target, source, stamp))
 
-    def ancestors(self, frame):
+    def ancestors(self, frame: str) -> List[str]:
         """The frame and its ancestors, the root last."""
         return path_to_root(self._parents, frame.lstrip('/'))
 
-    def forget_later(self, target_frame, source_frame):
+    def forget_later(self, target_frame: str, source_frame: str) -> None:
         """Forget what is later than the latest transforms of a frame between two others, if those were rejected."""
         between = self._between(target_frame.lstrip('/'), source_frame.lstrip('/'))
         rejected = [self._rejected[frame] for frame in between if frame in self._rejected]
@@ -104,7 +109,7 @@ class TransformBuffer(tf2_ros.BufferCore):
         if stamps_s:
             self._clear_after(max(stamps_s) + CACHE_S)
 
-    def link_to_root(self, target_frame, frame, target_from_frame):
+    def link_to_root(self, target_frame: str, frame: str, target_from_frame: np.ndarray) -> Tuple[str, str, np.ndarray]:
         """The transform (parent, child, parent_from_child (4, 4)) to the root of the tree of a frame that gives it a
         pose (4, 4) in a frame that tf does not contain.
 
@@ -117,17 +122,17 @@ class TransformBuffer(tf2_ros.BufferCore):
                              '--camera-pose; camera_height:=, camera_pose:=)' % (frame, target))
         return target, root, target_from_frame.dot(self.lookup(frame, root, NEWEST))
 
-    def senders(self):
+    def senders(self) -> Dict[str, Tuple[str, ...]]:
         """{frame: names of the nodes} of the recent frames that several nodes publish at once, see `Senders`."""
-        found = collections.defaultdict(Senders)
+        found: Dict[str, Senders] = collections.defaultdict(Senders)
         for transform, authority in list(self._recent):
             found[_child_of(transform)].add(authority)
         return {frame: nodes for frame, nodes in ((frame, each.take()) for frame, each in found.items()) if nodes}
 
-    def _between(self, target, source):
+    def _between(self, target: str, source: str) -> Set[str]:
         return set(path_to_root(self._parents, target)) ^ set(path_to_root(self._parents, source))
 
-    def _clear_after(self, stamp_s):
+    def _clear_after(self, stamp_s: float) -> None:
         recent = list(self._recent)  # a copy, as another thread may add transforms
         self.clear()
         for transform, authority in recent:
@@ -135,5 +140,5 @@ class TransformBuffer(tf2_ros.BufferCore):
                 self.set_transform(transform, authority)
 
 
-def _child_of(transform):
+def _child_of(transform: TransformStamped) -> str:
     return transform.child_frame_id.lstrip('/')

@@ -76,9 +76,9 @@ class Snapshots(object):
         if went_back or self._first_ns is None:
             self._first_ns = color.stamp_ns
 
-    def _on_lost_color(self, color, of_time_before):
+    def _on_lost_color(self, _color, stamp_ns, of_time_before):
         if not of_time_before:
-            self._on_lost(color.stamp_ns)
+            self._on_lost(stamp_ns)
 
 
 def _value_at(cache, stamp_ns):

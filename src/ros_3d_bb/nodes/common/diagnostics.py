@@ -8,7 +8,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rospy.topics import get_topic_manager
 from std_msgs.msg import Header
 
-from ros_3d_bb.core.event_counter import MOST_LAGS, EventCounter
+from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.params import with_places
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.common.master import is_ending
@@ -19,6 +19,7 @@ PERIOD_S = 1.0
 WARNING_LASTS_S = 5.0
 REMINDER_S = 30.0  # between two log lines about a persistent fault
 UNSUBSCRIBED_S = 5.0  # without subscribers, which may still be starting
+MOST_LAGS = 10000  # maximum number of stored latencies
 NO_RESULTS = '/rosout', '/diagnostics', '/clock', '/tf', '/tf_static'
 
 
@@ -37,7 +38,8 @@ class Diagnostics(EventCounter):
     """
 
     def __init__(self, part=Part()):
-        super(Diagnostics, self).__init__(clock=rospy.get_rostime)
+        super(Diagnostics, self).__init__()
+        self._lags_ns = collections.deque(maxlen=MOST_LAGS)  # latencies of the newest results
         self._warning, self._warned_at = '', float('-inf')
         self._logged_at, self._current_events = {}, set()
         self._reported_s = self._subscribed_s = time.monotonic()
@@ -116,6 +118,10 @@ class Diagnostics(EventCounter):
             self._logged_at[event] = now_s
             rospy.logwarn('%s', sentence)
 
+    def record_latency(self, stamp):
+        """Record the latency of a processed image, with or without a result, for the reported rate and latency."""
+        self._lags_ns.append(rospy.get_rostime().to_nsec() - stamp.to_nsec())
+
     def _log_missing_subscribers(self):
         """Log once if the results have no subscribers, and again after subscribers left. This is not a fault."""
         now_s, topics = time.monotonic(), unsubscribed_results() if self._monitors else []
@@ -127,7 +133,7 @@ class Diagnostics(EventCounter):
 
     def _rate_and_latency(self):
         """Yield (name, text) of the rate and latency of the results since the last report."""
-        lags_ns, self.lags_ns = self.lags_ns, collections.deque(maxlen=MOST_LAGS)
+        lags_ns, self._lags_ns = self._lags_ns, collections.deque(maxlen=MOST_LAGS)
         now_s = time.monotonic()
         passed_s, self._reported_s = max(now_s - self._reported_s, 1e-3), now_s
         yield 'rate', '%.1f Hz' % (len(lags_ns) / passed_s)

@@ -40,12 +40,12 @@ class ObservedTransforms(TransformBuffer):
 class GraphObserver(object):
     """Subscribe to the topics of the graph; `observations` returns what was received.
 
-    Topic names are taken from the remappings of doctor, or else from the diagnostics of the running nodes. `camera` is
-    the namespace of the observed camera if there are several.
+    Topic names are taken from the remappings of doctor, or else from the diagnostics of the running nodes.
+    `camera_name` is the namespace of the observed camera if there are several.
     """
 
-    def __init__(self, target_frame='', camera=''):
-        self._target_frame, self._camera = target_frame, camera
+    def __init__(self, target_frame='', camera_name=''):
+        self._target_frame, self._camera_name = target_frame, camera_name
         self._statuses, self._clocks = {}, []
         self._transforms = ObservedTransforms()
         self._listener = TransformListener(self._transforms)
@@ -92,15 +92,15 @@ class GraphObserver(object):
             cache_length_s=self._bbox3d_param('cache_length'), **self._edges.faults())
 
     def _bbox3d_param(self, name):
-        return _param(topic_of(self._camera, 'bbox3d_node'), name, Bbox3dParams)
+        return _param(topic_of(self._camera_name, 'bbox3d_node'), name, Bbox3dParams)
 
     def _topic_of(self, name):
         """Return the name of a topic of the nodes in this graph."""
-        wanted = name_for(self._camera, name)
+        wanted = name_for(self._camera_name, name)
         resolved = rospy.resolve_name(wanted)
         if resolved != rospy.get_namespace() + wanted:
             return resolved
-        prefix = (rospy.get_namespace() + self._camera).strip('/') + '/'  # of the nodes of this camera
+        prefix = (rospy.get_namespace() + self._camera_name).strip('/') + '/'  # of the nodes of this camera
         reported = [values.get('input ' + (name if node.startswith(prefix) else wanted), '')
                     for node, (_level, _sentence, values) in list(self._statuses.items())]
         return next((text.split()[0] for text in reported if text), resolved)
@@ -118,9 +118,9 @@ class GraphObserver(object):
                 self._statuses[status.name[:-len(OURS)]] = status.level, status.message, values
 
 
-def name_for(camera, topic):
+def name_for(camera_name, topic):
     """Return the name of a pipeline topic for one of several cameras; the tracks are common to all cameras."""
-    return topic if topic == TRACKS_TOPIC else topic_of(camera, topic)
+    return topic if topic == TRACKS_TOPIC else topic_of(camera_name, topic)
 
 
 def tracker_param(name):

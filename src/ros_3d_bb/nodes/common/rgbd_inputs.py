@@ -31,15 +31,16 @@ class RgbdInputs(object):
     """
 
     def __init__(self, params, diagnostics, transforms, **of_source):
-        self._diagnostics, self.lock, self.pipeline = diagnostics, threading.Lock(), CameraPipeline()
+        self._diagnostics, self.lock = diagnostics, threading.Lock()
         depth_topic, is_raw = DEPTH_TOPICS[params.depth][0], params.depth == RAW
         depth_info_topic = info_topic_beside(rospy.resolve_name(depth_topic))
         if transforms is None and (params.floor_frame or is_raw):
             transforms = Transforms(wait_s=0)
             diagnostics.show('tf age', transforms.age)
         topics = rospy.resolve_name(depth_topic), depth_info_topic, rospy.resolve_name(INFO_TOPICS[0])
-        source = RgbdSource(params, diagnostics, self.pipeline.on_match, transforms, topics, **of_source)
-        self.pipeline.source = source
+        self.pipeline = CameraPipeline(
+            lambda on_match: RgbdSource(params, diagnostics, on_match, transforms, topics, **of_source))
+        source = self.pipeline.source
         # Depth images are cached until their boxes arrive, so the subscriber queues must not drop any.
         subscribe(depth_topic, Image, self.receiver('depth images', source.add_depth), KEPT_AT_ONCE)
         subscribe_camera_info(INFO_TOPICS[0], COLOR_INFO_IMAGES[params.depth],

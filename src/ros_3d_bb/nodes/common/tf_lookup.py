@@ -62,16 +62,13 @@ class TransformListener(object):
             return self._jumps.are_recent()
 
 
-class Transforms(object):
-    """tf2 lookup with a timeout in wall-clock time, so that a stopped /clock cannot block the node.
-
-    Attribute `buffer`: the TransformBuffer.
-    """
+class Transforms(TransformBuffer):
+    """tf2 buffer that receives tf. `lookup` waits in wall-clock time, so that a stopped /clock cannot block a node."""
 
     def __init__(self, wait_s):
+        super(Transforms, self).__init__()
         self._wait_s = wait_s
-        self.buffer = TransformBuffer()
-        self._listener = TransformListener(self.buffer)
+        self._listener = TransformListener(self)
         # By (target, source): time; (sentence, time); stamp of the latest transform, and ROS time since it is known.
         self._requested, self._explanations, self._newest = {}, {}, {}
 
@@ -87,17 +84,13 @@ class Transforms(object):
         with self._listener.news:
             while True:
                 try:
-                    return self.buffer.lookup(*frames, stamp)
+                    return super(Transforms, self).lookup(*frames, stamp)
                 except tf2_ros.TransformException as error:
                     left_s, fault = deadline_s - time.monotonic(), error
                 if left_s <= 0 or rospy.is_shutdown():
                     break
                 self._listener.news.wait(min(left_s, LONGEST_WAIT_S))
         raise type(fault)(self._explanation(frames, stamp) or str(fault))
-
-    def ancestors(self, frame):
-        """As of the TransformBuffer."""
-        return self.buffer.ancestors(frame)
 
     def latest(self, target_frame, source_frame, timeout_s):
         """Look up the latest transform, which is that received last after a jump in time, too. Returns it, as `lookup`,
@@ -109,9 +102,9 @@ class Transforms(object):
         """
         target, source = target_frame.lstrip('/'), source_frame.lstrip('/')
         self._listener.has_jumped()
-        self.buffer.forget_later(target, source)
+        self.forget_later(target, source)
         target_from_source = self.lookup(target, source, rospy.Time())
-        newest = self.buffer.get_latest_common_time(target, source)
+        newest = self.get_latest_common_time(target, source)
         if not newest or target == source:
             return target_from_source, 0.0
         now = rospy.get_rostime()
@@ -144,7 +137,7 @@ class Transforms(object):
 
     def _age_of(self, target_frame, source_frame):
         try:
-            newest = self.buffer.get_latest_common_time(target_frame, source_frame)
+            newest = self.get_latest_common_time(target_frame, source_frame)
         except tf2_ros.TransformException:
             return 'none'
         return '%.3f s' % (rospy.get_rostime() - newest).to_sec() if newest else 'static'
@@ -157,7 +150,7 @@ class Transforms(object):
         now_s = time.monotonic()
         recent = {key: entry for key, entry in list(self._explanations.items()) if now_s - entry[1] < EXPLAINED_S}
         if frames not in recent:
-            links = links_in(self.buffer.all_frames_as_yaml())
+            links = links_in(self.all_frames_as_yaml())
             recent[frames] = why_missing(links, *frames, stamp_s=stamp.to_sec())[0], now_s
         self._explanations = recent
         return recent[frames][0]
