@@ -2,7 +2,6 @@
 import functools
 import math
 import re
-from typing import NamedTuple, Optional, Tuple
 
 import genpy
 import numpy as np
@@ -11,6 +10,7 @@ from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 
 from ros_3d_bb import msg
 from ros_3d_bb.camera.camera_model import Camera, check_intrinsics, transform_from
+from ros_3d_bb.core.boxes2d import Boxes2D
 from ros_3d_bb.core.object_classes import MAX_COORDINATE_M, MAX_SIZE_M, PERSON, label_fault, score_fault, usable_label
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import Box3D
@@ -30,23 +30,6 @@ CLASSES = re.compile(r'(?:;classes=([^;]*))?(?:;scores=([^;]*))?\Z')
 OCCUPIED = 65  # of 100, as from map_server (occupied_thresh)
 CORNERS = 'x1 y1 x2 y2'  # label of the second dimension, followed by the size of the image if it is known
 IMAGE_SIZE = re.compile(r' in ([0-9]{1,9}) x ([0-9]{1,9})\Z')
-
-
-class Boxes2D(NamedTuple):
-    """The 2D boxes of one image: (n, 4) integer pixels x1, y1, x2, y2, and the stamp and frame of the image.
-
-    `stamp_ns` is None for a plain array, which does not identify its image. `labels` are the class names of the boxes;
-    `scores` (n,) are 0..1, 0 if unknown. `image_size` is the (width, height) of the image, None if unknown. `color` is
-    the image, RGB (height, width, 3), if it is known.
-    """
-
-    boxes: np.ndarray
-    stamp_ns: Optional[int]
-    frame_id: str
-    labels: Tuple[str, ...]
-    scores: np.ndarray
-    image_size: Optional[Tuple[int, int]] = None
-    color: Optional[np.ndarray] = None
 
 
 def time_from(stamp_ns):

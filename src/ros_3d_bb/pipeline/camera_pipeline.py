@@ -7,7 +7,8 @@ from std_msgs.msg import Int32MultiArray
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.images import RgbdFrame
 from ros_3d_bb.conversions.camera_msgs import uncompressed
-from ros_3d_bb.conversions.perception_msgs import Boxes2D, boxes2d_from_msg, boxes3d_to_msg, header_of
+from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, boxes3d_to_msg, header_of
+from ros_3d_bb.core.boxes2d import Boxes2D
 from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.detection.boxes import Detections
 from ros_3d_bb.estimation.box3d import Box3D

@@ -7,7 +7,7 @@ from typing import Any, Deque, Dict, Iterable, List, NamedTuple, Optional
 import numpy as np
 
 from ros_3d_bb.camera.images import RgbdFrame, turned_rotation
-from ros_3d_bb.conversions.perception_msgs import Boxes2D
+from ros_3d_bb.core.boxes2d import Boxes2D
 from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.object_classes import PERSON, PERSON_CLASS, read_object_classes
 from ros_3d_bb.core.params import (CLASSES_FILE, DEPTH, DEPTH_SCALE, IMAGE_ROTATION, LARGEST, STAMP_TOLERANCE, Param,

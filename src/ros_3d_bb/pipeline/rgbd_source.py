@@ -12,8 +12,8 @@ from ros_3d_bb.camera.images import DepthImage, RgbdFrame, turns_for
 from ros_3d_bb.camera.registration import RegisteredDepth
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, INFO_TOPICS, RAW
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
-from ros_3d_bb.conversions.perception_msgs import (Boxes2D, boxes2d_from_msg, camera_from_msg, stamp_if_any,
-                                                   stamp_of)
+from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, camera_from_msg, stamp_if_any, stamp_of
+from ros_3d_bb.core.boxes2d import Boxes2D
 from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.time_sync import NS, RECENT, StampSynchronizer, Stamped, half_period_of
 from ros_3d_bb.pipeline.depth_registration import DepthRegistration
