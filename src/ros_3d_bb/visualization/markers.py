@@ -34,10 +34,10 @@ AREA, VIEW = 'ignored_area', 'field_of_view'
 OUTLINE_SCALES = {AREA: Vector3(0.06, 0, 0), VIEW: Vector3(0.03, 0, 0)}
 UPRIGHT = Quaternion(0, 0, 0, 1)
 CHI2_95 = 5.991  # 95 % quantile of chi squared with 2 degrees of freedom: squared semi-axes in standard deviations
-CIRCLE = np.array([(np.cos(angle), np.sin(angle)) for angle in np.linspace(0, 2 * np.pi, 25)])
+CIRCLE = np.array([(np.cos(angle), np.sin(angle)) for angle in np.linspace(0, 2 * np.pi, 17)])
 ELLIPSES_EVERY_S = 0.5  # along the prediction
 FLOOR_OFFSET_M = 0.02  # avoids flickering of lines in the plane of RViz's grid
-HISTORY_POINTS, HISTORY_SPACING_S = 100, 0.1  # maximum number, minimum distance
+HISTORY_POINTS, HISTORY_SPACING_S = 50, 0.2  # maximum number, minimum distance
 
 
 @parameters('what RViz shows')
