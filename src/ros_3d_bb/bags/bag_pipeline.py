@@ -3,8 +3,11 @@ import collections
 import contextlib
 import itertools
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any, NamedTuple, Optional
+from typing import Any, Deque, Dict, Iterator, List, NamedTuple, Optional, Set, Tuple, Union
 
+import genpy
+import numpy as np
+import rosbag
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.bags.bag_reader import BagError, BagReader, Raw, message_in
@@ -18,7 +21,7 @@ from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.yolov5.backends import open_detector
-from ros_3d_bb.pipeline.camera_pose import FLOOR, POSE_FITTED, POSE_TEXT, CameraPoseStage
+from ros_3d_bb.pipeline.camera_pose import POSE_FITTED, POSE_TEXT, CameraPoseStage
 from ros_3d_bb.pipeline.detection_stage import CameraRotation, detect_in_color
 from ros_3d_bb.pipeline.people_pipeline import (DEPTH_INFO_TOPIC, INFO_TOPIC, INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA,
                                                 PeoplePipeline, Settings)
@@ -42,7 +45,7 @@ class Waiting(NamedTuple):
 class BagRun(object):
     """A run of the pipeline on one bag."""
 
-    def __init__(self, reader, settings, events):
+    def __init__(self, reader: BagReader, settings: Settings, events: EventCounter) -> None:
         self._reader, self._settings, self._events = reader, settings, events
         needed = BOXES_TOPIC if settings.detector == 'none' else COLOR_TOPIC
         self._ahead_ns = int(settings.tracker[0].tf_timeout * NS)
@@ -52,7 +55,7 @@ class BagRun(object):
                 self._topics[settings.name(topic, camera_name)] = topic, camera_name
         # As in the nodes, the detector has a buffer of its own, because it is ahead of the other stages.
         self._transforms, self._detector_transforms = BagTransforms(), BagTransforms()
-        self._unread_tf = collections.deque()  # (time_ns, message) of tf that is not in the buffer yet
+        self._unread_tf: Deque[Tuple[int, TFMessage]] = collections.deque()  # by time; not in the buffer yet
         self._pipeline = PeoplePipeline(settings, events, self._transforms)
         self._detector = None
         if settings.detector == 'yolov5':
@@ -64,14 +67,14 @@ class BagRun(object):
         for camera_name in settings.camera_names:
             reader.check_topic(settings.name(needed, camera_name), *INPUTS[needed])
 
-    def outputs(self):
+    def outputs(self) -> Iterator[Tuple[genpy.Time, Optional[Raw], List[Tuple[str, Any]]]]:
         """Yield (time, Raw, [(topic, message), ...]): each message of the bag with the messages published by the nodes,
         and those at its end, with None instead of Raw."""
         static, time = self._settings.name(STATIC_TOPIC), None
         for raw in self._reader.messages([static]):
             self._add_static(raw)
         if self._settings.camera_pose is not None:
-            self._set_camera_pose()
+            self._set_camera_pose(self._settings.camera_pose)
         self._read_depth_cameras()
         with ThreadPoolExecutor(self._settings.searches) as pool:
             for waiting in self._ahead(pool):
@@ -84,13 +87,13 @@ class BagRun(object):
         self._pipeline.end()
         yield time, None, self._pipeline.take_results()
 
-    def _add_static(self, raw):
+    def _add_static(self, raw: Raw) -> None:
         with self._events.rejecting('transforms'):
             message = message_in(raw, TFMessage)
             self._transforms.add_static(message)
             self._detector_transforms.add_static(message)
 
-    def _set_camera_pose(self):
+    def _set_camera_pose(self, given: Union[str, Tuple[float, float, float]]) -> None:
         """Set the pose of the camera, which tf does not contain.
 
         The other frames of the bag are those of the driver, which do not move, even if it publishes them on tf.
@@ -98,13 +101,13 @@ class BagRun(object):
         tf_topic, ends_ns = self._settings.name(TF_TOPIC), self._reader.span_ns[0] + DRIVER_TF_NS
         for raw in itertools.takewhile(lambda raw: raw.time.to_nsec() < ends_ns, self._reader.messages([tf_topic])):
             self._add_static(raw)
-        frame_id, pose = self._fitted_pose() if self._settings.camera_pose == FLOOR else self._given_pose()
+        frame_id, pose = self._fitted_pose() if isinstance(given, str) else self._given_pose(given)
         for transforms in (self._transforms, self._detector_transforms) if frame_id else ():
             transforms.set_pose(self._settings.tracker[0].target_frame, frame_id, pose)
 
-    def _given_pose(self):
+    def _given_pose(self, given: Tuple[float, float, float]) -> Tuple[str, np.ndarray]:
         """Return the frame of the 3D boxes, empty if no message has it, and its pose (4, 4) from the settings."""
-        params, (height_m, tilt_rad, roll_rad) = self._settings.bbox3d[0], self._settings.camera_pose
+        params, (height_m, tilt_rad, roll_rad) = self._settings.bbox3d[0], given
         pose = mounted_camera(height_m, tilt_rad, turns_for(params.image_rotation, None), roll_rad)
         topic = INFO_TOPIC if params.depth == RAW else DEPTH_TOPIC  # whose frame is that of the 3D boxes
         for raw in self._reader.messages([self._settings.name(topic)]):
@@ -112,7 +115,7 @@ class BagRun(object):
                 return params.frame_id or message_in(raw, *INPUTS[topic]).header.frame_id, pose
         return '', pose
 
-    def _fitted_pose(self):
+    def _fitted_pose(self) -> Tuple[str, np.ndarray]:
         """Return the frame of the depth images, and its pose (4, 4) from the floor in them. Raises ValueError."""
         params = self._settings.bbox3d[0]
         stage, depth = CameraPoseStage(params), self._settings.name(DEPTH_TOPIC)
@@ -126,13 +129,14 @@ class BagRun(object):
                     stage.add_depth(message_in(raw, *INPUTS[DEPTH_TOPIC]))
             if stage.is_complete:
                 break
-        if stage.pose is None:
+        floor_from_camera = stage.floor_from_camera
+        if floor_from_camera is None:
             raise ValueError('no image on %s shows the floor, to which --camera-pose fits the pose of the camera; give '
                              'it with --camera-height, --camera-tilt and --camera-roll' % depth)
         self._events.note(POSE_FITTED, POSE_TEXT % stage.pose)
-        return stage.frame_id, stage.floor_from_camera
+        return stage.frame_id, floor_from_camera
 
-    def _read_depth_cameras(self):
+    def _read_depth_cameras(self) -> None:
         """Pass the first camera_info of raw depth to the pipeline, which needs it for the first image."""
         for name, (topic, camera_name) in self._topics.items():
             raw = next(self._reader.messages([name]), None) if topic == DEPTH_INFO_TOPIC else None
@@ -140,9 +144,10 @@ class BagRun(object):
                 with self._events.rejecting('messages on %s' % name):
                     self._pipeline.take(topic, message_in(raw, *INPUTS[topic]), raw.time.to_nsec(), camera_name)
 
-    def _ahead(self, pool):
+    def _ahead(self, pool: ThreadPoolExecutor) -> Iterator[Waiting]:
         """Yield the messages with a delay, to read transforms within ~tf_timeout and images for the detector ahead."""
-        queue, size, searches = collections.deque(), 0, 0
+        queue: Deque[Waiting] = collections.deque()
+        size, searches = 0, 0
         for raw in self._reader.messages():
             queue.append(self._begun(raw, pool))
             size, searches = size + len(raw.data), searches + (queue[-1].search is not None)
@@ -155,7 +160,7 @@ class BagRun(object):
         while queue:
             yield queue.popleft()
 
-    def _begun(self, raw, pool):
+    def _begun(self, raw: Raw, pool: ThreadPoolExecutor) -> Waiting:
         """Start the work that can be done ahead of a message's processing: read transforms, submit detections."""
         topic, camera_name = self._topics.get(raw.topic, UNUSED)
         if topic == TF_TOPIC:
@@ -170,14 +175,14 @@ class BagRun(object):
                 return Waiting(raw, image, pool.submit(detect_in_color, self._detector, image, turns))
         return Waiting(raw)
 
-    def _process(self, waiting):
+    def _process(self, waiting: Waiting) -> None:
         raw, image, search = waiting
         topic, camera_name = self._topics.get(raw.topic, UNUSED)
         if topic in (None, STATIC_TOPIC):
             return
         now_ns = raw.time.to_nsec()
         self._events.count('messages on %s' % raw.topic)
-        if search is not None:
+        if search is not None and self._detector is not None:
             with self._pipeline.detecting():
                 pixels, found = search.result()
                 self._events.count('images processed')
@@ -187,13 +192,14 @@ class BagRun(object):
                 self._pipeline.take(topic, message_in(raw, *INPUTS[topic]), now_ns, camera_name)
 
 
-def process_bag(source, target, settings=Settings()):
+def process_bag(source: str, target: str, settings: Settings = Settings()) -> EventCounter:
     """Write a bag with the messages of another bag and those that the nodes would publish. Returns an EventCounter.
 
     Raises BagError if the source cannot be read, ValueError if a parameter is invalid, and OSError if the target cannot
     be written; no target remains then.
     """
-    events, made, types = EventCounter(), _outputs_of(settings), {}
+    events, made = EventCounter(), _outputs_of(settings)
+    types: Dict[str, str] = {}
     with BagReader(source) as reader, new_bag(target, settings.compression) as bag:
         run = BagRun(reader, settings, events)
         for topic in settings.keep or ():
@@ -210,7 +216,7 @@ def process_bag(source, target, settings=Settings()):
     return events
 
 
-def _outputs_of(settings):
+def _outputs_of(settings: Settings) -> Set[str]:
     """Return the names of the topics that the pipeline writes."""
     made = set(settings.name(topic) for topic in OUTPUTS)
     made.update(settings.name(topic, name) for topic in OUTPUTS_OF_CAMERA for name in settings.camera_names
@@ -218,7 +224,7 @@ def _outputs_of(settings):
     return made
 
 
-def _copy(raw, bag):
+def _copy(raw: Raw, bag: rosbag.Bag) -> None:
     """Write a Raw to a bag unchanged."""
     unused = type('Unused', (), {'_md5sum': raw.md5sum})  # rosbag requires a class, but uses the connection header
     bag.write(raw.topic, (raw.datatype, raw.data, raw.md5sum, unused), raw.time, raw=True,

@@ -3,7 +3,7 @@
 rosbag generates and executes Python code from each message definition in a bag. This reader does not use the
 definitions: messages of known types are deserialized by the installed class, all others remain bytes.
 """
-from typing import Any, NamedTuple
+from typing import Any, Iterable, Iterator, NamedTuple, Optional, Tuple
 
 import genpy
 import rosbag
@@ -39,7 +39,7 @@ class BagReader(object):
     Names have a leading slash. `rosbag record` stores them as they are given, with or without.
     """
 
-    def __init__(self, path):
+    def __init__(self, path: str) -> None:
         self._path = path
         try:
             self._bag = rosbag.Bag(path)
@@ -56,22 +56,22 @@ class BagReader(object):
         except Exception as error:  # a damaged file can cause any exception
             raise BagError('%s is not a readable bag (%s)' % (path, cause(error)))
 
-    def __enter__(self):
+    def __enter__(self) -> 'BagReader':
         return self
 
-    def __exit__(self, *_error):
+    def __exit__(self, *_error: Any) -> None:
         for md5sum in self._unread:
             rosbag.bag._message_types.pop(md5sum, None)
         self._bag.close()
 
     @property
-    def span_ns(self):
+    def span_ns(self) -> Tuple[int, int]:
         """Times of recording of the first and the last message in nanoseconds; (0, 0) for an empty bag."""
         if not self._bag.get_message_count():
             return 0, 0
-        return tuple(int(1e9 * time_s) for time_s in (self._bag.get_start_time(), self._bag.get_end_time()))
+        return int(1e9 * self._bag.get_start_time()), int(1e9 * self._bag.get_end_time())
 
-    def check_topic(self, topic, *kinds):
+    def check_topic(self, topic: str, *kinds: Any) -> None:
         """Raise BagError if a bag has no such topic of these message classes. The error names topics of these types."""
         types = [kind._type for kind in kinds]
         if self.topics.get(topic) in types:
@@ -81,7 +81,7 @@ class BagReader(object):
             self._path, ' or '.join(types), topic, 'did you mean %s? Remap it with --remap. Topics of this type: %s'
             % (nearest_name(topic, others), ', '.join(others)) if others else 'it has no topic of this type'))
 
-    def messages(self, topics=None):
+    def messages(self, topics: Optional[Iterable[str]] = None) -> Iterator[Raw]:
         """Yield the messages (Raw) of all or some topics in the order of recording. Raises BagError."""
         names = None if topics is None else [name for name in self._stored_names if absolute(name) in topics]
         if names == []:  # rosbag would read all topics
@@ -100,7 +100,7 @@ class BagReader(object):
             yield Raw(absolute(entry.topic), datatype, md5sum, data, entry.timestamp, entry.connection_header)
 
 
-def message_in(raw, *kinds):
+def message_in(raw: Raw, *kinds: Any) -> Any:
     """Deserialize a Raw as one of some message classes. Raises ValueError if its type differs, or it is damaged.
 
     Its name may differ: /tf of old bags is a tf/tfMessage, which has the definition of tf2_msgs/TFMessage.

@@ -4,6 +4,7 @@ import collections
 import contextlib
 import os
 import sys
+from typing import Any, Callable, Dict, Iterable, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 import rosbag
@@ -14,13 +15,13 @@ from ros_3d_bb.conversions.camera_msgs import START_NS, CameraFrame, messages_of
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, boxes2d_to_msg, time_from
 from ros_3d_bb.core.atomic_file import clean_up_on_sigterm, replacement_of
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
+from ros_3d_bb.sessions.session_reader import Session, read_color, read_depth, read_session
 
 PARTIAL = '.active'  # suffix of incomplete bags, as in rosbag record
 MOUNT_M = (0.17, 0.0, 0.20)  # position of the camera of a Jackal in base_link: forward, left, up (thesis 3.5.1)
 
 
-def write_bag(images, path, compression='lz4'):
+def write_bag(images: Iterable[Any], path: str, compression: str = 'lz4') -> int:
     """Write `images`, an iterable of (stamp_ns, iterable of (topic, message)), to a bag, and return their number.
 
     If `images` raises an exception, no bag remains. `compression` is none, bz2 or lz4.
@@ -35,7 +36,7 @@ def write_bag(images, path, compression='lz4'):
 
 
 @contextlib.contextmanager
-def new_bag(path, compression):
+def new_bag(path: str, compression: str) -> Iterator[rosbag.Bag]:
     """Open a rosbag.Bag for writing. It has a temporary name until the block ends without an error."""
     with replacement_of(path, os.path.basename(path) + '.', PARTIAL) as partial:
         bag = rosbag.Bag(partial, 'w', compression=compression)
@@ -48,12 +49,12 @@ def new_bag(path, compression):
         bag.close()
 
 
-def images_in(path, topics):
+def images_in(path: str, topics: Sequence[str]) -> List[List[Tuple[str, Any]]]:
     """Read the messages of a bag on some topics, grouped by image: a list of lists of (topic, message).
 
     Topics have no leading slash. Raises ValueError if the bag cannot be read, or an image lacks one of the topics.
     """
-    images = collections.OrderedDict()
+    images: Dict[int, List[Tuple[str, Any]]] = collections.OrderedDict()
     try:
         with rosbag.Bag(path) as bag:
             for topic, message, stamp in bag.read_messages(['/' + topic for topic in topics]):
@@ -70,7 +71,8 @@ def images_in(path, topics):
     return list(images.values())
 
 
-def session_images(session, rate_hz=30.0, mount_m=MOUNT_M, with_boxes=False):
+def session_images(session: Session, rate_hz: float = 30.0, mount_m: Sequence[float] = MOUNT_M,
+                   with_boxes: bool = False) -> Iterator[Tuple[int, List[Tuple[str, Any]]]]:
     """Yield the images of a measurement session for `write_bag`, optionally with their 2D boxes.
 
     `mount_m` is the position of the forward-facing camera in base_link (x forward, y left, z up), metres. It is tilted
@@ -90,7 +92,7 @@ def session_images(session, rate_hz=30.0, mount_m=MOUNT_M, with_boxes=False):
         yield stamp_ns, messages
 
 
-def session_to_bag():
+def session_to_bag() -> None:
     """The command `session_to_bag`: convert a measurement session to a bag of a camera on a stationary Jackal."""
     parser = bag_command_parser('session_to_bag', session_to_bag.__doc__)
     parser.add_argument('session', help='folder of a measurement session, with frames.json')
@@ -107,13 +109,14 @@ def session_to_bag():
                                                                    arguments.mount, arguments.boxes))
 
 
-def bag_command_parser(name, doc):
-    parser = argparse.ArgumentParser(prog=name, description=doc.split(': ', 1)[1])
+def bag_command_parser(name: str, doc: Optional[str]) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog=name, description=(doc or '').split(': ', 1)[-1])
     parser.add_argument('--compression', choices=('none', 'bz2', 'lz4'), default='lz4', help='default: lz4')
     return parser
 
 
-def write_bag_of_command(parser, arguments, images):
+def write_bag_of_command(parser: argparse.ArgumentParser, arguments: argparse.Namespace,
+                         images: Callable[[], Iterable[Any]]) -> None:
     """Write the bag of a command. Print the cause and exit with 1 if a session or a scenario cannot be read."""
     clean_up_on_sigterm()
     try:

@@ -3,6 +3,7 @@ import argparse
 import math
 import os
 import sys
+from typing import Any, Callable, Dict, Iterable, List, Optional, Tuple
 
 import yaml
 
@@ -11,6 +12,7 @@ from ros_3d_bb.bags.bag_reader import BagError
 from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPICS, STATIC_TOPIC, TF_TOPIC
 from ros_3d_bb.core.atomic_file import clean_up_on_sigterm
 from ros_3d_bb.core.error_text import cause
+from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.params import IMAGE_ROTATION, nearest_name, params_from, with_places
 from ros_3d_bb.core.yaml_loader import load_yaml
 from ros_3d_bb.estimation.box3d import REASONS
@@ -24,7 +26,7 @@ FILES = (('--yolov5-params', 'yolov5'), ('--depth-params', 'depth'), ('--bbox3d-
 OPTIONS = 'weights', 'error_model', 'target_frame', 'cameras', 'depth', 'image_rotation'  # parameters with an option
 
 
-def main(arguments=None):
+def main(arguments: Optional[List[str]] = None) -> None:
     """Run the command. The exit status is 1 if the bag could not be processed."""
     parser = _parser()
     given = parser.parse_args(arguments)
@@ -49,14 +51,15 @@ def main(arguments=None):
     sys.exit(0)
 
 
-def _settings_from(given):
+def _settings_from(given: argparse.Namespace) -> Settings:
     """Return the settings for the command line arguments. Raises ValueError, OSError or yaml.YAMLError."""
     settings = Settings()._replace(detector=given.detector, names=_names(given.remap), compression=given.compression,
                                    keep=None if given.keep is None else tuple(t.lstrip('/') for t in given.keep))
     for option, node in FILES:
         path = getattr(given, option[2:].replace('-', '_'))
         try:
-            settings = settings._replace(**{node: read_params(path, getattr(settings, node))})
+            parts: Any = read_params(path, getattr(settings, node))
+            settings = settings._replace(**{node: parts})
         except (ValueError, OSError, yaml.YAMLError) as error:
             raise ValueError('%s: %s' % (option, error))
     cameras = given.cameras and [name.strip() for name in given.cameras.split(',')]
@@ -75,7 +78,7 @@ def _settings_from(given):
     return settings._replace(searches=given.searches or len(os.sched_getaffinity(0)))
 
 
-def _check_names(settings):
+def _check_names(settings: Settings) -> None:
     """Raise ValueError if a remapped topic is not one of the nodes with these cameras and this kind of depth."""
     unmapped = settings._replace(names={})
     topics = [unmapped.name(topic)[1:] for topic in OUTPUTS + (TF_TOPIC, STATIC_TOPIC)] + [
@@ -87,7 +90,7 @@ def _check_names(settings):
                              % (ours, theirs, ours, nearest_name(ours, topics)))
 
 
-def _with_camera(settings, given):
+def _with_camera(settings: Settings, given: argparse.Namespace) -> Settings:
     """Return settings with the orientation of the camera that the command line gives. Raises ValueError."""
     if given.image_rotation:
         for node in IMAGE_NODES:
@@ -109,7 +112,7 @@ def _with_camera(settings, given):
     return settings._replace(camera_pose=given.camera_pose or _given_pose(given))
 
 
-def _given_pose(given):
+def _given_pose(given: argparse.Namespace) -> Tuple[float, float, float]:
     """Return height, tilt and roll of the camera on the command line. Raises ValueError."""
     if not (0 < given.camera_height < HIGHEST_M and abs(given.camera_tilt) < math.pi / 2):
         raise ValueError('--camera-height is %g and --camera-tilt %g; more than 0 and less than %g m, and less than '
@@ -120,13 +123,14 @@ def _given_pose(given):
     return given.camera_height, given.camera_tilt, given.camera_roll
 
 
-def with_params(settings, node, **changed):
+def with_params(settings: Settings, node: str, **changed: Any) -> Settings:
     """Return settings with changed parameters of a node, which are in the first of its parameter classes."""
     first, *others = getattr(settings, node)
-    return settings._replace(**{node: (first._replace(**changed), *others)})
+    parts: Any = (first._replace(**changed), *others)
+    return settings._replace(**{node: parts})
 
 
-def read_params(path, defaults):
+def read_params(path: Optional[str], defaults: Tuple[Any, ...]) -> Tuple[Any, ...]:
     """Read the parameters of a node from a YAML file; missing parameters are taken from `defaults`."""
     if path is None:
         return defaults
@@ -142,7 +146,7 @@ def read_params(path, defaults):
                  for part, new in zip(defaults, found))
 
 
-def _reason(source, settings, error):
+def _reason(source: str, settings: Settings, error: Exception) -> str:
     """Return why a bag was not processed, as a sentence that names it."""
     if isinstance(error, BagError):
         return str(error)
@@ -151,7 +155,7 @@ def _reason(source, settings, error):
     return '%s: %s: %s' % (source, type(error).__name__, cause(error))
 
 
-def option_of(name, detector):
+def option_of(name: str, detector: str) -> str:
     """Return the option that sets a parameter of the nodes with a detector; empty if no node has it."""
     if name in OPTIONS:
         return '--' + name.replace('_', '-')
@@ -161,8 +165,8 @@ def option_of(name, detector):
     return ' and '.join(files)
 
 
-def _summary(events, detector):
-    def placed(event):
+def _summary(events: EventCounter, detector: str) -> List[str]:
+    def placed(event: str) -> str:
         return with_places(events.sentences[event], lambda name: option_of(name, detector))
 
     lines = ['  %7d  %s%s' % (count, event, '. The first: %s' % placed(event)
@@ -170,7 +174,7 @@ def _summary(events, detector):
     return lines + ([] if events.counts.get(TRACKED) else ['no tracks: ' + _why_no_tracks(events, placed)])
 
 
-def _why_no_tracks(events, placed):
+def _why_no_tracks(events: EventCounter, placed: Callable[[str], str]) -> str:
     """Return the likely cause if no track was written, as a sentence."""
     counts = events.counts
     event = max(set(events.sentences) - {POSE_FITTED, NOT_KEPT}, key=lambda each: (counts[each], each), default=None)
@@ -185,7 +189,7 @@ def _why_no_tracks(events, placed):
             '(--image-rotation)')
 
 
-def _names(remaps):
+def _names(remaps: Iterable[str]) -> Dict[str, str]:
     names = {}
     for remap in remaps:
         ours, arrow, theirs = remap.partition(':=')
@@ -195,7 +199,7 @@ def _names(remaps):
     return names
 
 
-def _parser():
+def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog='process_bag', description='Copy a bag and add 2D boxes, 3D boxes, tracks '
                                      'and markers. Equal inputs give identical bytes.')
     parser.add_argument('source', metavar='IN', help='bag to process')

@@ -1,8 +1,9 @@
 """Messages of an RGB-D camera on a robot: images, camera_info and transforms, on the topics of realsense2_camera."""
 import copy
 import re
-from typing import Any, NamedTuple, Sequence
+from typing import Any, Iterable, Iterator, List, NamedTuple, Sequence, Tuple
 
+import genpy
 import numpy as np
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
@@ -25,6 +26,7 @@ DEPTH_TOPICS = {'aligned': (DEPTH_TOPIC, INFO_TOPICS[1]),
 # Topic of the images with the intrinsics of the colour camera_info, by ~depth; see `info_of_images`.
 COLOR_INFO_IMAGES = {'aligned': DEPTH_TOPIC, RAW: COLOR_TOPIC}
 CAMERA = 'camera'  # namespace of the topics of a single camera
+Link = Tuple[str, str, np.ndarray]  # parent, child, parent_from_child (4, 4)
 TYPES = {TF_TOPIC: TFMessage, COLOR_TOPIC: Image, DEPTH_TOPIC: Image, INFO_TOPICS[0]: CameraInfo,
          INFO_TOPICS[1]: CameraInfo}
 IMAGE_KINDS = Image, CompressedImage  # that the nodes accept as an image
@@ -47,12 +49,12 @@ class CameraFrame(NamedTuple):
     transforms: Sequence[Any]
 
 
-def absolute(name):
+def absolute(name: str) -> str:
     """Name of a topic with a leading slash."""
     return '/' + name.lstrip('/')
 
 
-def topic_of(camera_name, topic):
+def topic_of(camera_name: str, topic: str) -> str:
     """Return the name of a topic for a camera, given by its namespace; '' for a single camera.
 
     Images are on the topics of a driver with that camera name (front/color/image_raw), results are in the same
@@ -63,12 +65,12 @@ def topic_of(camera_name, topic):
     return '%s/%s' % (camera_name, topic[len(CAMERA) + 1:] if topic.startswith(CAMERA + '/') else topic)
 
 
-def info_topic_beside(image_topic):
+def info_topic_beside(image_topic: str) -> str:
     """Return the topic of the camera_info of an image topic, which may be that of a compressed transport."""
     return '/'.join(_names_of(image_topic)[:-1] + ['camera_info'])
 
 
-def info_of_images(message, image_topic):
+def info_of_images(message: CameraInfo, image_topic: str) -> CameraInfo:
     """Return the sensor_msgs/CameraInfo of the images on a topic.
 
     Rectified images, which the name of their topic tells (image_rect, image_color_rect), have the intrinsics P and no
@@ -81,26 +83,26 @@ def info_of_images(message, image_topic):
     return rectified
 
 
-def _names_of(image_topic):
+def _names_of(image_topic: str) -> List[str]:
     """Return the parts of the name of an image topic, without that of its transport."""
     parts = image_topic.split('/')
     return parts[:-1] if parts[-1] in TRANSPORTS else parts
 
 
-def uncompressed(message):
+def uncompressed(message: Any) -> Image:
     """Return an image message as sensor_msgs/Image. Raises ValueError as `image_msgs.pixels_from`."""
     if not is_compressed(message):
         return message
     return fill_image(Image(header=message.header), *pixels_from(message))
 
 
-def messages_of(frame):
+def messages_of(frame: CameraFrame) -> Iterator[Tuple[str, Any]]:
     """Yield (topic, message) of one CameraFrame, in the order in which a robot publishes them."""
     yield TF_TOPIC, TFMessage(transform_messages(frame.header.stamp, frame.transforms))
     yield from image_messages_of(frame)
 
 
-def image_messages_of(frame):
+def image_messages_of(frame: CameraFrame) -> Iterator[Tuple[str, Any]]:
     """Yield (topic, message) of one CameraFrame without its transforms."""
     header, depth = frame.header, frame.depth
     for topic in INFO_TOPICS:
@@ -112,7 +114,7 @@ def image_messages_of(frame):
     yield COLOR_TOPIC, fill_image(Image(header=header), frame.color, 'rgb8')
 
 
-def transform_messages(stamp, links):
+def transform_messages(stamp: genpy.Time, links: Iterable[Link]) -> List[TransformStamped]:
     """Convert (parent, child, parent_from_child (4, 4)) links to a list of TransformStamped."""
     messages = []
     for parent, child, parent_from_child in links:
@@ -123,7 +125,7 @@ def transform_messages(stamp, links):
     return messages
 
 
-def _camera_info(camera, header):
+def _camera_info(camera: Camera, header: Header) -> CameraInfo:
     info = CameraInfo(header=header, width=camera.width, height=camera.height)
     info.distortion_model, info.D = camera.distortion_model or PLUMB_BOB, list(camera.distortion) or [0.0] * 5
     info.K = [camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1]
@@ -132,6 +134,6 @@ def _camera_info(camera, header):
     return info
 
 
-def frame_id_of(camera_name):
+def frame_id_of(camera_name: str) -> str:
     """Return the frame of the images of a camera, given by its name; '' for a single camera."""
     return '%s_color_optical_frame' % (camera_name or CAMERA)

@@ -3,6 +3,7 @@
 The declared size is checked before anything is decoded. OpenCV is imported where it is used, see `camera.distortion`.
 """
 import struct
+from typing import Tuple
 
 import numpy as np
 
@@ -15,7 +16,7 @@ DEPTH_HEADER = struct.Struct('<iff')  # ConfigHeader of the transport: format (u
 MAX_NIBBLES = 10  # of a number in RVL, each with three bits
 
 
-def decode(format_text, data):
+def decode(format_text: str, data: bytes) -> Tuple[np.ndarray, str]:
     """Return the pixels, (height, width[, channels]), of a compressed image and their encoding as in sensor_msgs/Image.
 
     Raises ValueError if the data are not JPEG, PNG or compressed depth, are damaged, or have too many pixels.
@@ -33,7 +34,7 @@ def decode(format_text, data):
     return _decode_with_opencv(data, False), 'bgr8'
 
 
-def _declared(data):
+def _declared(data: bytes) -> Tuple[int, int, bool]:
     """Return the width and height in the header of a complete JPEG or PNG, and whether it is 16-bit grey."""
     if data.startswith(JPEG):
         width, height = _jpeg_size(data)
@@ -48,7 +49,7 @@ def _declared(data):
     return width, height, is_grey16
 
 
-def _jpeg_size(data):
+def _jpeg_size(data: bytes) -> Tuple[int, int]:
     """Return the width and height in the first frame header of a JPEG. Stops at markers that cannot precede it."""
     at = len(JPEG)
     while at + 9 <= len(data) and data[at] == 0xff:
@@ -64,12 +65,12 @@ def _jpeg_size(data):
     raise ValueError('the header of its JPEG is damaged')
 
 
-def _check_size(width, height):
+def _check_size(width: int, height: int) -> None:
     if not 0 < width * height <= MAX_PIXELS:
         raise ValueError('it has %d x %d pixels; 1 to %d pixels expected' % (width, height, MAX_PIXELS))
 
 
-def _decode_with_opencv(data, unchanged):
+def _decode_with_opencv(data: bytes, unchanged: bool) -> np.ndarray:
     """Decode a JPEG or PNG to BGR, or unchanged, which must give one channel."""
     import cv2
     flags = cv2.IMREAD_UNCHANGED if unchanged else cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
@@ -84,7 +85,7 @@ def _decode_with_opencv(data, unchanged):
     return pixels
 
 
-def _decode_depth(encoding, is_rvl, data):
+def _decode_depth(encoding: str, is_rvl: bool, data: bytes) -> Tuple[np.ndarray, str]:
     """Decode a message of the compressed_depth_image_transport: its header, then 16-bit values as PNG or RVL.
 
     Depth in metres, 32FC1, is stored as inverse depth: depth = A / (value - B), and 0 if it is not measured.
@@ -114,7 +115,7 @@ def _decode_depth(encoding, is_rvl, data):
     return depth_m, '32FC1'
 
 
-def _decode_rvl(data):
+def _decode_rvl(data: bytes) -> np.ndarray:
     """Decode RVL (Wilson, Fast Lossless Depth Image Compression, 2017): width, height, and runs of zeros and others.
 
     A number has three bits in each nibble, lowest first; the highest bit of a nibble announces another one. Each run
@@ -133,16 +134,16 @@ def _decode_rvl(data):
         at += 2 + others[-1]
     if done != width * height or at > numbers.size:
         raise ValueError('its RVL has %d of %d x %d pixels' % (done, width, height))
-    others = np.array(others)
-    starts = 2 * np.arange(1, others.size + 1) + np.cumsum(others) - others  # of the differences of each run in numbers
-    within = np.arange(others.sum())
-    zigzag = numbers[within + np.repeat(starts - (np.cumsum(others) - others), others)]
+    lengths = np.array(others)
+    starts = 2 * np.arange(1, lengths.size + 1) + np.cumsum(lengths) - lengths  # of the differences of a run in numbers
+    within = np.arange(lengths.sum())
+    zigzag = numbers[within + np.repeat(starts - (np.cumsum(lengths) - lengths), lengths)]
     pixels = np.zeros(width * height, np.uint16)
-    pixels[within + np.repeat(np.cumsum(zeros), others)] = np.cumsum((zigzag >> 1) ^ -(zigzag & 1)).astype(np.uint16)
+    pixels[within + np.repeat(np.cumsum(zeros), lengths)] = np.cumsum((zigzag >> 1) ^ -(zigzag & 1)).astype(np.uint16)
     return pixels.reshape(height, width)
 
 
-def _rvl_numbers(data):
+def _rvl_numbers(data: bytes) -> np.ndarray:
     """Return the numbers of RVL, which are in nibbles of little-endian 32-bit words, the highest nibble first."""
     octets = np.frombuffer(data, '<u4').astype('>u4').view(np.uint8)
     nibbles = np.column_stack([octets >> 4, octets & 15]).ravel()

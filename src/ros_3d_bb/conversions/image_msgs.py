@@ -4,6 +4,8 @@ cv_bridge is not used, because it has no Python 3 build on Melodic and does not 
 functions accept any object with the fields of sensor_msgs/Image or sensor_msgs/CompressedImage and do not import ROS.
 OpenCV is imported only where it is used, see `camera.distortion`.
 """
+from typing import Any, Optional, Sequence, Tuple
+
 import numpy as np
 
 from ros_3d_bb.camera.images import DepthImage
@@ -30,7 +32,7 @@ LEAST_SAMPLES = 8  # with fewer valid pixels the unit is not checked
 NEAREST_M, FARTHEST_M = 0.1, 100.0  # plausible range of the median
 
 
-def array_from(message):
+def array_from(message: Any) -> np.ndarray:
     """Return the pixels, (height, width[, channels]), of an image message as a read-only view of its data.
 
     Raises ValueError if the encoding is unknown, the size is zero, or the data are shorter than the size requires.
@@ -46,12 +48,13 @@ def array_from(message):
         raise ValueError('image data is too short: %d bytes in rows of %d, for %d x %d pixels of %s'
                          % (len(message.data), message.step, message.width, message.height, message.encoding))
     pixel_bytes = channels * dtype.itemsize
-    pixels = np.ndarray((message.height, message.width, channels), dtype, buffer=message.data,
-                        strides=(message.step, pixel_bytes, dtype.itemsize))
+    strides = message.step, pixel_bytes, dtype.itemsize
+    pixels: np.ndarray = np.ndarray((message.height, message.width, channels), dtype, message.data, 0, strides)
     return pixels[..., 0] if channels == 1 else pixels
 
 
-def pixels_from(message, encodings=tuple(LAYOUTS), content='supported'):
+def pixels_from(message: Any, encodings: Sequence[str] = tuple(LAYOUTS),
+                content: str = 'supported') -> Tuple[np.ndarray, str]:
     """Return the pixels, (height, width[, channels]), of an image message, which may be compressed, and their encoding.
 
     Raises ValueError as `array_from`, if a compressed image cannot be decoded, or if the encoding is not one of
@@ -73,12 +76,12 @@ def pixels_from(message, encodings=tuple(LAYOUTS), content='supported'):
     return pixels, encoding
 
 
-def is_compressed(message):
+def is_compressed(message: Any) -> bool:
     """Whether an image message is a sensor_msgs/CompressedImage."""
     return hasattr(message, 'format')
 
 
-def imgmsg_to_rgb(message):
+def imgmsg_to_rgb(message: Any) -> np.ndarray:
     """Return the pixels of a colour image message as RGB, (height, width, 3), uint8; a view if the encoding allows it.
 
     Raises ValueError as `pixels_from`, and if the encoding is not colour or grey.
@@ -91,7 +94,7 @@ def imgmsg_to_rgb(message):
     return pixels[..., 2::-1] if encoding in ('bgr8', 'bgra8', '8UC3') else pixels[..., :3]
 
 
-def _converted(pixels, encoding):
+def _converted(pixels: np.ndarray, encoding: str) -> np.ndarray:
     """Return YUV or Bayer pixels as RGB. Of 16 bits the higher 8 are used."""
     import cv2
     if pixels.dtype.itemsize == 2:
@@ -103,7 +106,7 @@ def _converted(pixels, encoding):
                          % (pixels.shape[1], pixels.shape[0], encoding, error.err))
 
 
-def imgmsg_to_depth(message, scale_m=None, check_unit=False):
+def imgmsg_to_depth(message: Any, scale_m: Optional[float] = None, check_unit: bool = False) -> DepthImage:
     """Convert an image message to a DepthImage.
 
     Raises ValueError as `pixels_from`, if the encoding is not a depth encoding, and with `check_unit` as `units_fault`.
@@ -117,7 +120,7 @@ def imgmsg_to_depth(message, scale_m=None, check_unit=False):
     return depth
 
 
-def units_fault(depth):
+def units_fault(depth: DepthImage) -> str:
     """Return a sentence if the median of a few hundred pixels of a DepthImage indicates a wrong unit, '' otherwise."""
     values = depth.values[::max(1, depth.values.shape[0] // GRID), ::max(1, depth.values.shape[1] // GRID)]
     valid = values[np.isfinite(values) & (values > 0)]
@@ -135,7 +138,7 @@ def units_fault(depth):
                scale_m))
 
 
-def fill_image(message, pixels, encoding):
+def fill_image(message: Any, pixels: np.ndarray, encoding: str) -> Any:
     """Write pixels (height, width[, channels]) to an image message, except for its header. Returns the message.
 
     Raises ValueError if the pixels do not have the type and channels of the encoding.

@@ -2,14 +2,19 @@
 import functools
 import math
 import re
+from typing import Any, Dict, Iterable, List, Optional, Sequence, Tuple
 
 import genpy
 import numpy as np
-from geometry_msgs.msg import PoseWithCovariance
+from geometry_msgs.msg import PoseWithCovariance, TransformStamped
+from nav_msgs.msg import OccupancyGrid
+from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
+from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb import msg
-from ros_3d_bb.camera.camera_model import Camera, check_intrinsics, transform_from
+from ros_3d_bb.camera.camera_model import Camera, Vector, check_intrinsics, transform_from
+from ros_3d_bb.camera.images import RgbdFrame
 from ros_3d_bb.core.boxes2d import Boxes2D
 from ros_3d_bb.core.object_classes import MAX_COORDINATE_M, MAX_SIZE_M, PERSON, label_fault, score_fault, usable_label
 from ros_3d_bb.core.time_sync import NS
@@ -32,12 +37,12 @@ CORNERS = 'x1 y1 x2 y2'  # label of the second dimension, followed by the size o
 IMAGE_SIZE = re.compile(r' in ([0-9]{1,9}) x ([0-9]{1,9})\Z')
 
 
-def time_from(stamp_ns):
+def time_from(stamp_ns: int) -> genpy.Time:
     """Convert integer nanoseconds to a ROS time."""
     return genpy.Time(*divmod(stamp_ns, NS))
 
 
-def stamp_of(message):
+def stamp_of(message: Any) -> int:
     """Return the stamp of a message in integer nanoseconds.
 
     Raises ValueError if the stamp is zero, because the message cannot be paired or transformed, or if it exceeds the
@@ -52,12 +57,12 @@ def stamp_of(message):
     return stamp_ns
 
 
-def stamp_if_any(message):
+def stamp_if_any(message: Any) -> Optional[int]:
     """Return the stamp as `stamp_of`, or None if it is zero: for messages without a fixed time, such as CameraInfo."""
     return stamp_of(message) if message.header.stamp else None
 
 
-def check_transforms(message):
+def check_transforms(message: TFMessage) -> None:
     """Raise ValueError if a stamp in a tf2_msgs/TFMessage exceeds the range of tf2, see `stamp_of`."""
     for transform in message.transforms:
         if transform.header.stamp.to_nsec() >= LATEST_NS:
@@ -65,7 +70,9 @@ def check_transforms(message):
                              % (transform.child_frame_id, transform.header.stamp.secs))
 
 
-def boxes2d_to_msg(boxes, header, labels=None, scores=None, image_size=None):
+def boxes2d_to_msg(boxes: np.ndarray, header: Header, labels: Optional[Sequence[str]] = None,
+                   scores: Optional[Vector] = None,
+                   image_size: Optional[Sequence[int]] = None) -> Int32MultiArray:
     """Convert 2D boxes to std_msgs/Int32MultiArray, with the stamp and frame of their image in the layout.
 
     `boxes` (n, 4) are x1, y1, x2, y2 in pixels, which are rounded to integers; `header` is that of the image. `labels`
@@ -86,13 +93,14 @@ def boxes2d_to_msg(boxes, header, labels=None, scores=None, image_size=None):
     return message
 
 
-def detections2d_to_msg(detections, names, header, image_size):
+def detections2d_to_msg(detections: Any, names: Sequence[str], header: Header,
+                        image_size: Sequence[int]) -> Int32MultiArray:
     """Convert `detection.boxes.Detections` as `boxes2d_to_msg`; `names` are the class names by number."""
     return boxes2d_to_msg(detections.boxes, header, [names[number] for number in detections.classes],
                           detections.scores, image_size)
 
 
-def boxes2d_from_msg(message):
+def boxes2d_from_msg(message: Int32MultiArray) -> Boxes2D:
     """Convert an Int32MultiArray, with or without stamp, classes and scores in its layout, to Boxes2D.
 
     Without classes, the boxes are those of people; without scores, their scores are unknown. Raises ValueError if the
@@ -108,8 +116,8 @@ def boxes2d_from_msg(message):
     label = dimensions[0].label if dimensions else ''
     size = IMAGE_SIZE.search(dimensions[1].label) if len(dimensions) > 1 else None
     image_size = size and (int(size.group(1)), int(size.group(2)))
-    classes_and_scores = CLASSES.search(label)
-    labels, scores = _labels_and_scores(*classes_and_scores.groups(), len(boxes))
+    classes_and_scores: Any = CLASSES.search(label)  # which matches any text
+    labels, scores = _labels_and_scores(len(boxes), *classes_and_scores.groups())
     fields = {}
     for field in label[:classes_and_scores.start()].split(';', 2):
         name, _equals, value = field.partition('=')
@@ -123,7 +131,7 @@ def boxes2d_from_msg(message):
     return Boxes2D(boxes, int(secs) * NS + int(nsecs), fields.get('frame', ''), labels, scores, image_size)
 
 
-def _labels_and_scores(classes, scores, count):
+def _labels_and_scores(count: int, classes: Optional[str], scores: Optional[str]) -> Tuple[Tuple[str, ...], np.ndarray]:
     """Class names and scores of `count` boxes from the texts in a label, which are None if they are missing."""
     labels, numbers = (PERSON,) * count, np.zeros(count)
     for name, text in (('classes', classes), ('scores', scores)):
@@ -144,7 +152,7 @@ def _labels_and_scores(classes, scores, count):
     return labels, numbers
 
 
-def with_stamp(message, stamp):
+def with_stamp(message: Any, stamp: genpy.Time) -> Any:
     """Replace the stamp of a message: in its header, the headers of its transforms, or the label of its 2D boxes.
 
     Frames are kept. Messages with a header are modified in place, because images are large. Returns the message.
@@ -158,7 +166,7 @@ def with_stamp(message, stamp):
     return message
 
 
-def camera_from_msg(message):
+def camera_from_msg(message: CameraInfo) -> Camera:
     """Convert a sensor_msgs/CameraInfo to a camera model with intrinsics and lens distortion, of the images that it
     belongs to: K is that of the full resolution, of which `roi` and `binning` are a part.
 
@@ -174,7 +182,8 @@ def camera_from_msg(message):
 
 
 @functools.lru_cache(maxsize=16)  # cameras send their calibration with each image
-def _camera_of(size, part, binning, matrix, distortion_model, distortion):
+def _camera_of(size: Tuple[int, int], part: Tuple[int, int, int, int], binning: Tuple[int, int],
+               matrix: Tuple[float, ...], distortion_model: str, distortion: Tuple[float, ...]) -> Camera:
     if not any(matrix):
         raise ValueError('it is empty (all of K is zero): the driver does not know the calibration of the camera')
     check_intrinsics(Camera(*size, matrix[0], matrix[4], matrix[2], matrix[5]))
@@ -183,23 +192,23 @@ def _camera_of(size, part, binning, matrix, distortion_model, distortion):
                   (matrix[2] - left) / binning_x, (matrix[5] - top) / binning_y, distortion_model, distortion)
 
 
-def transform_from_msg(message):
+def transform_from_msg(message: TransformStamped) -> np.ndarray:
     """Convert a geometry_msgs/TransformStamped to a 4x4 matrix, header.frame_id from child_frame_id."""
     translation, rotation = message.transform.translation, message.transform.rotation
     return transform_from((translation.x, translation.y, translation.z),
                           (rotation.x, rotation.y, rotation.z, rotation.w))
 
 
-def header_of(frame):
+def header_of(frame: RgbdFrame) -> Header:
     """Return the header of the 3D boxes in an RgbdFrame, whose positions are those at the stamp of the depth image."""
     return Header(stamp=time_from(frame.depth_stamp_ns), frame_id=frame.frame_id)
 
 
-def boxes3d_to_msg(boxes, header, camera):
+def boxes3d_to_msg(boxes: Iterable[Box3D], header: Header, camera: Camera) -> BoundingBox3DArray:
     """Convert 3D boxes (`box3d.Box3D`) to BoundingBox3DArray. Inverse of `usable_boxes3d`."""
     array = BoundingBox3DArray(header=header)
     for box in boxes:
-        score, support = np.float32([box.score, box.support]).tolist()  # as received, so that process_bag does the same
+        score, support = np.array((box.score, box.support), np.float32).tolist()  # as received, as in process_bag
         message = BoundingBox3D(label=box.label, score=score, support=support, truncated=any(box.truncated_edges))
         for flag, is_cut in zip(EDGE_FLAGS, box.truncated_edges):
             message.truncated_edges |= flag if is_cut else 0
@@ -217,18 +226,18 @@ def boxes3d_to_msg(boxes, header, camera):
     return array
 
 
-def _box3d_from_msg(box):
+def _box3d_from_msg(box: BoundingBox3D) -> Box3D:
     covariance_m2 = np.reshape(box.position_covariance, (3, 3)) if any(box.position_covariance) else None
     roi = box.roi
     rect_px = (roi.x_offset, roi.y_offset, roi.x_offset + roi.width, roi.y_offset + roi.height)
-    edges = tuple([bool(box.truncated_edges & flag) for flag in EDGE_FLAGS])
+    edges: Any = tuple([bool(box.truncated_edges & flag) for flag in EDGE_FLAGS])
     if box.truncated and not any(edges):
         edges = (True,) * len(EDGE_FLAGS)  # the truncated edges are unknown, so no edge is trusted
     return Box3D(_xyz(box.center.position), _xyz(box.size), rect_px, box.support, edges, covariance_m2,
                  box.label or PERSON, box.score, appearance=tuple(box.appearance) or None)
 
 
-def usable_boxes3d(message):
+def usable_boxes3d(message: BoundingBox3DArray) -> Tuple[Dict[int, Box3D], List[str]]:
     """Convert the 3D boxes of a BoundingBox3DArray that can be tracked. Inverse of `boxes3d_to_msg`.
 
     Returns {index in the message: `box3d.Box3D`}, and a sentence about the fault of each other box. Raises
@@ -247,7 +256,7 @@ def usable_boxes3d(message):
     return usable, faults
 
 
-def _box3d_fault(box, position_covariance):
+def _box3d_fault(box: Box3D, position_covariance: Sequence[float]) -> str:
     """Describe what is wrong with a Box3D from a message, '' if it can be tracked."""
     if not box.is_plausible:
         return ('centre (%g, %g, %g) and size (%g, %g); finite numbers and sizes of more than 0 and less than %g m '
@@ -261,7 +270,7 @@ def _box3d_fault(box, position_covariance):
     return label_fault(box.label) or score_fault(box.score)
 
 
-def _is_covariance(elements_m2):
+def _is_covariance(elements_m2: Sequence[float]) -> bool:
     """Whether a 3x3 matrix, given by rows, is finite and positive semi-definite.
 
     It is if the Gaussian elimination of its symmetric part, plus the tolerance, has positive pivots. For single small
@@ -279,12 +288,12 @@ def _is_covariance(elements_m2):
     return pivot_y > 0 and zz + tolerance_m2 - xz * xz / pivot_x - yz * yz / pivot_y > 0
 
 
-def tracks_to_msg(tracks, header):
+def tracks_to_msg(tracks: Iterable[TrackedObject], header: Header) -> TrackedObjectArray:
     """Convert tracks (`types.TrackedObject`) to TrackedObjectArray."""
     return TrackedObjectArray(header=header, objects=[_track_to_msg(track) for track in tracks])
 
 
-def _track_to_msg(track):
+def _track_to_msg(track: TrackedObject) -> Any:
     message = msg.TrackedObject(id=track.id, label=track.label, score=track.score, detection=track.detection,
                                 status=track.status, moving=track.moving,
                                 first_seen=time_from(track.first_seen_ns), last_seen=time_from(track.last_seen_ns),
@@ -298,23 +307,23 @@ def _track_to_msg(track):
         point.x, point.y, point.z = position_m
         message.prediction.append(pose)
     if track.covariance is not None:
-        message.pose.covariance, message.twist.covariance, *ahead = _covariances_6x6(track)
+        message.pose.covariance, message.twist.covariance, *ahead = _covariances_6x6(track, track.covariance)
         for pose, covariance in zip(message.prediction, ahead):
             pose.covariance = covariance
     return message
 
 
-def _covariances_6x6(track):
+def _covariances_6x6(track: TrackedObject, covariance: np.ndarray) -> List[List[float]]:
     """Flattened 6x6 covariances, as in geometry_msgs, of the position, the velocity and the predicted positions of a
     track; zeros for the rotation: an upright cylinder is rotationally symmetric."""
     full = np.zeros((2 + len(track.prediction_m), 6, 6))
-    full[0, :3, :3], full[1, :3, :3] = track.covariance[:3, :3], track.covariance[3:, 3:]
+    full[0, :3, :3], full[1, :3, :3] = covariance[:3, :3], covariance[3:, 3:]
     if track.prediction_covariance_m2 is not None:
         full[2:, :3, :3] = track.prediction_covariance_m2
     return full.reshape(-1, 36).tolist()
 
 
-def tracks_from_msg(message):
+def tracks_from_msg(message: TrackedObjectArray) -> List[TrackedObject]:
     """Convert a TrackedObjectArray to a list of `types.TrackedObject`.
 
     The message contains neither the instantaneous velocity, which is set to the velocity of the track, nor the
@@ -323,7 +332,7 @@ def tracks_from_msg(message):
     return [_track_from_msg(track) for track in message.objects]
 
 
-def _track_from_msg(track):
+def _track_from_msg(track: Any) -> TrackedObject:
     velocity_mps = _xyz(track.twist.twist.linear)
     prediction_m = np.array([_xyz(pose.pose.position) for pose in track.prediction]).reshape(-1, 3)
     covariance = prediction_covariance_m2 = None
@@ -337,7 +346,7 @@ def _track_from_msg(track):
                          track.label or PERSON, track.score, track.detection)
 
 
-def occupied_from_msg(message):
+def occupied_from_msg(message: OccupancyGrid) -> OccupiedCells:
     """Convert a nav_msgs/OccupancyGrid to OccupiedCells. Raises ValueError if it is invalid."""
     info, place, turn = message.info, message.info.origin.position, message.info.origin.orientation
     yaw = 2 * np.arctan2(turn.z, turn.w)
@@ -350,19 +359,19 @@ def occupied_from_msg(message):
     return OccupiedCells(cells, info.resolution, (place.x, place.y, float(yaw)))
 
 
-def _covariance_3x3(with_covariance):
+def _covariance_3x3(with_covariance: Any) -> np.ndarray:
     return np.reshape(with_covariance.covariance, (6, 6))[:3, :3]
 
 
-def _set_position(pose, position_m):
+def _set_position(pose: Any, position_m: Sequence[float]) -> None:
     """Set the position of a geometry_msgs/Pose that is not rotated."""
     _set_xyz(pose.position, position_m)
     pose.orientation.w = 1.0
 
 
-def _set_xyz(message, values):
+def _set_xyz(message: Any, values: Sequence[float]) -> None:
     message.x, message.y, message.z = values
 
 
-def _xyz(message):
+def _xyz(message: Any) -> np.ndarray:
     return np.array([message.x, message.y, message.z])

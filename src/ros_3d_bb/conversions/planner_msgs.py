@@ -3,14 +3,18 @@
 Message classes of optional packages are passed as an argument, the `msg` module of the package. Tracks are lists of
 `types.TrackedObject` in the frame of the header.
 """
+from typing import Any, Sequence, Tuple
+
 import numpy as np
 from geometry_msgs.msg import Point, Point32, Pose, PoseStamped, Quaternion, Twist
 from nav_msgs.msg import MapMetaData, OccupancyGrid
 from sensor_msgs.msg import PointCloud2, PointField
+from std_msgs.msg import Header
 
 from ros_3d_bb.conversions.perception_msgs import tracks_to_msg
 from ros_3d_bb.core.object_classes import COCO
 from ros_3d_bb.msg import TrackedObject
+from ros_3d_bb.tracking.types import TrackedObject as Track
 
 STATUS_NAMES = {TrackedObject.VISIBLE: 'visible', TrackedObject.OCCLUDED: 'occluded',
                 TrackedObject.OUT_OF_VIEW: 'out of view'}
@@ -19,7 +23,7 @@ CLASSIFICATIONS = {'person': 'PEDESTRIAN', 'bicycle': 'BIKE', 'car': 'CAR', 'tru
                    'motorcycle': 'MOTORCYCLE', 'bus': 'OTHER_VEHICLE'}  # of derived_object_msgs/Object
 
 
-def people_to_msg(tracks, header, people_msgs):
+def people_to_msg(tracks: Sequence[Track], header: Header, people_msgs: Any) -> Any:
     """Convert tracks of all classes to people_msgs/People; class, score, status and size (metres) are in the tags."""
     return people_msgs.People(header=header, people=[people_msgs.Person(
         name=str(track.id), position=Point(*track.position_m), velocity=Point(*track.velocity_mps),
@@ -29,7 +33,7 @@ def people_to_msg(tracks, header, people_msgs):
         for track in tracks])
 
 
-def obstacles_to_msg(tracks, header, costmap_converter):
+def obstacles_to_msg(tracks: Sequence[Track], header: Header, costmap_converter: Any) -> Any:
     """Convert tracks to costmap_converter/ObstacleArrayMsg: circles given by one point (float32) and a radius."""
     obstacles = []
     for track in tracks_to_msg(tracks, header).objects:
@@ -41,7 +45,7 @@ def obstacles_to_msg(tracks, header, costmap_converter):
     return costmap_converter.ObstacleArrayMsg(header=header, obstacles=obstacles)
 
 
-def objects_to_msg(tracks, header, derived_object_msgs):
+def objects_to_msg(tracks: Sequence[Track], header: Header, derived_object_msgs: Any) -> Any:
     """Convert tracks to derived_object_msgs/ObjectArray: upright cylinders, classified by `CLASSIFICATIONS`."""
     objects = []
     for track in tracks_to_msg(tracks, header).objects:
@@ -57,7 +61,7 @@ def objects_to_msg(tracks, header, derived_object_msgs):
     return derived_object_msgs.ObjectArray(header=header, objects=objects)
 
 
-def detections3d_to_msg(tracks, header, vision_msgs):
+def detections3d_to_msg(tracks: Sequence[Track], header: Header, vision_msgs: Any) -> Any:
     """Convert tracks to vision_msgs/Detection3DArray (ROS 1).
 
     The id of the first hypothesis is the track ID. That of a second one is the number of the class in COCO (0: person),
@@ -73,11 +77,11 @@ def detections3d_to_msg(tracks, header, vision_msgs):
     return vision_msgs.Detection3DArray(header=header, detections=detections)
 
 
-def _reliability(track):
+def _reliability(track: Track) -> float:
     return 1.0 if track.status == TrackedObject.VISIBLE else UNSEEN_RELIABILITY
 
 
-def points_to_msg(points_m, header):
+def points_to_msg(points_m: np.ndarray, header: Header) -> PointCloud2:
     """Convert points (n, 3), in metres, to sensor_msgs/PointCloud2 with x, y, z as float32."""
     fields = [PointField(name=name, offset=4 * number, datatype=PointField.FLOAT32, count=1)
               for number, name in enumerate('xyz')]
@@ -86,21 +90,21 @@ def points_to_msg(points_m, header):
                        data=np.asarray(points_m, '<f4').tobytes())
 
 
-def grid_to_msg(costs, cell_m, origin_m, header):
+def grid_to_msg(costs: np.ndarray, cell_m: float, origin_m: Sequence[float], header: Header) -> OccupancyGrid:
     """Convert costs (rows, columns), int8, of which cell (0, 0) has its corner at `origin_m`, to an OccupancyGrid."""
     info = MapMetaData(header.stamp, cell_m, costs.shape[1], costs.shape[0],
                        Pose(Point(origin_m[0], origin_m[1], 0), Quaternion(w=1.0)))
     return OccupancyGrid(header, info, costs.ravel().tolist())
 
 
-def velocity_to_msg(x, y, angular):
+def velocity_to_msg(x: float, y: float, angular: float) -> Twist:
     """Convert a velocity in the plane to geometry_msgs/Twist."""
     message = Twist()
     message.linear.x, message.linear.y, message.angular.z = x, y, angular
     return message
 
 
-def velocity_from_msg(message):
+def velocity_from_msg(message: Twist) -> Tuple[float, float, float]:
     """Velocity along x, along y and about z of a geometry_msgs/Twist. Raises ValueError if it is not finite."""
     velocity = message.linear.x, message.linear.y, message.angular.z
     if not np.isfinite(velocity).all():
@@ -108,6 +112,6 @@ def velocity_from_msg(message):
     return velocity
 
 
-def pose_to_msg(x, y, yaw, header):
+def pose_to_msg(x: float, y: float, yaw: float, header: Header) -> PoseStamped:
     """Convert a pose in the plane to geometry_msgs/PoseStamped."""
     return PoseStamped(header, Pose(Point(x, y, 0.0), Quaternion(0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2))))

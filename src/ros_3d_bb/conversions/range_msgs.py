@@ -2,21 +2,23 @@
 import copy
 
 import numpy as np
-from sensor_msgs.msg import Image, PointField
+from sensor_msgs.msg import Image, LaserScan, PointCloud2, PointField
+from std_msgs.msg import Header
 
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.conversions.image_msgs import fill_image
 
 SUFFICIENT = 'x', 'y', 'z'
 
 
-def scan_without(message, is_removed):
+def scan_without(message: LaserScan, is_removed: np.ndarray) -> LaserScan:
     """A copy of a sensor_msgs/LaserScan in which some ranges, bool (n,), are NaN (REP 117: invalid)."""
     changed = copy.copy(message)
     changed.ranges = np.where(is_removed, np.nan, message.ranges).tolist()
     return changed
 
 
-def points_of_cloud(message):
+def points_of_cloud(message: PointCloud2) -> np.ndarray:
     """Points (height * width, 3) of a sensor_msgs/PointCloud2, float32. Raises ValueError if it has no x, y and z of
     this type, or too few bytes."""
     offsets = {field.name: field.offset for field in message.fields if field.datatype == PointField.FLOAT32}
@@ -33,7 +35,7 @@ def points_of_cloud(message):
     return np.column_stack([points[name] for name in SUFFICIENT])
 
 
-def cloud_without(message, is_removed):
+def cloud_without(message: PointCloud2, is_removed: np.ndarray) -> PointCloud2:
     """A copy of a sensor_msgs/PointCloud2 without some points, bool (n,). In an image of points (height > 1), the
     bytes of these points are those of NaN."""
     rows = np.frombuffer(message.data, np.uint8).reshape(-1, message.point_step)
@@ -49,7 +51,7 @@ def cloud_without(message, is_removed):
     return changed
 
 
-def depth_without(header, depth, is_removed):
+def depth_without(header: Header, depth: DepthImage, is_removed: np.ndarray) -> Image:
     """A sensor_msgs/Image of a DepthImage in which some pixels, bool (h, w), are invalid (REP 118)."""
     is_float = depth.values.dtype.kind == 'f'
     values = np.where(is_removed, depth.values.dtype.type(np.nan if is_float else 0), depth.values)

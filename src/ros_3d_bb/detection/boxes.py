@@ -2,7 +2,7 @@
 
 Convention: boxes are (x1, y1, x2, y2) in pixels, x to the right, y down, x2 and y2 exclusive.
 """
-from typing import NamedTuple
+from typing import List, NamedTuple
 
 import numpy as np
 
@@ -15,11 +15,12 @@ class Detections(NamedTuple):
     classes: np.ndarray
 
 
-def non_maximum_suppression(detections, iou_limit, max_det):
+def non_maximum_suppression(detections: Detections, iou_limit: float, max_det: int) -> Detections:
     """Remove the Detections that overlap one of the same class and a higher score by more than `iou_limit`, and those
     after the first `max_det`.
     """
-    boxes, kept = detections.boxes, []
+    boxes = detections.boxes
+    kept: List[int] = []
     remaining = np.ones(len(boxes), bool)
     while remaining.any() and len(kept) < max_det:
         best = int(remaining.argmax())
@@ -31,7 +32,7 @@ def non_maximum_suppression(detections, iou_limit, max_det):
     return Detections(*(column[kept] for column in detections))
 
 
-def iou(box, boxes):
+def iou(box: np.ndarray, boxes: np.ndarray) -> np.ndarray:
     """Intersection over union of a box (4,) with each of boxes (n, 4); 0 if both are empty."""
     box, boxes = np.asarray(box, float), np.asarray(boxes, float).reshape(-1, 4)
     overlap = np.minimum(box[2:], boxes[:, 2:]) - np.maximum(box[:2], boxes[:, :2])

@@ -2,7 +2,7 @@
 
 Convention: boxes are (x1, y1, x2, y2) in pixels of the image, x to the right, y down, x2 and y2 exclusive.
 """
-from typing import NamedTuple, Tuple
+from typing import Any, List, NamedTuple, Optional, Sequence, Tuple
 
 import cv2
 import numpy as np
@@ -57,7 +57,7 @@ class Placement(NamedTuple):
     scale: Tuple[float, float]
     shift: Tuple[int, int]
 
-    def undo(self, boxes, image_hw):
+    def undo(self, boxes: np.ndarray, image_hw: Sequence[int]) -> np.ndarray:
         """Convert boxes from input pixels to image pixels, clipped to the image."""
         boxes = (boxes - np.tile(self.shift, 2)) / np.tile(self.scale, 2)
         height, width = image_hw
@@ -83,7 +83,7 @@ class NetworkDetector(object):
         If there is no class to detect, or the model does not have one of the classes.
     """
 
-    def __init__(self, network, params=DetectionParams()):
+    def __init__(self, network: Any, params: DetectionParams = DetectionParams()) -> None:
         if not params.classes:
             raise ValueError('classes is empty; at least one class expected, such as person')
         self._network, self._params = network, params
@@ -94,20 +94,20 @@ class NetworkDetector(object):
         self._stride = network.stride if network.input_hw is None else None
 
     @property
-    def has_fixed_size(self):
+    def has_fixed_size(self) -> bool:
         """Whether the network accepts only one size, so that `image_size` has no effect."""
         return self._network.input_hw is not None
 
     @property
-    def input_px(self):
+    def input_px(self) -> int:
         """Longer side of the network's input, pixels."""
         return max(self._input_hw)
 
-    def with_params(self, params):
+    def with_params(self, params: DetectionParams) -> 'NetworkDetector':
         """Return a detector with the same network and other parameters. Raises ValueError like the constructor."""
         return NetworkDetector(self._network, params)
 
-    def detect(self, image):
+    def detect(self, image: np.ndarray) -> Detections:
         """Return the Detections in an RGB image (height, width, 3), uint8."""
         scaled, placement = fit_image(image, self._input_hw, self._stride, self._network.resize)
         candidates = ranked(self._network.candidates(scaled, self._params.confidence), self._classes)
@@ -116,7 +116,7 @@ class NetworkDetector(object):
         return detections._replace(boxes=placement.undo(detections.boxes, image.shape[:2]))
 
 
-def class_number(entry, names):
+def class_number(entry: Any, names: List[str]) -> int:
     """Number of a class that is given by name or number. Raises ValueError if the model does not have it."""
     if entry in names:
         return names.index(entry)
@@ -129,7 +129,8 @@ def class_number(entry, names):
                      % (entry, len(names), ', '.join(names)))
 
 
-def fit_image(image, input_hw, stride=None, resize=Resize()):
+def fit_image(image: np.ndarray, input_hw: Tuple[int, int], stride: Optional[int] = None,
+              resize: Resize = Resize()) -> Tuple[np.ndarray, Placement]:
     """Scale an image to the network's input and pad it.
 
     It is padded to `input_hw`, or to the next multiple of a stride. Returns the image, which is the given one if it
@@ -154,7 +155,8 @@ def fit_image(image, input_hw, stride=None, resize=Resize()):
     return image, Placement(scale_xy, (left, top))
 
 
-def batch_of(image, order=RGB, mean=(0.0, 0.0, 0.0), std=(255.0, 255.0, 255.0), dtype=np.float32):
+def batch_of(image: np.ndarray, order: Sequence[int] = RGB, mean: Sequence[float] = (0.0, 0.0, 0.0),
+             std: Sequence[float] = (255.0, 255.0, 255.0), dtype: Any = np.float32) -> np.ndarray:
     """Convert an RGB image (height, width, 3), uint8, to a batch (1, 3, height, width) of (value - mean) / std.
 
     `order` is that of the channels in the batch, in mean and in std.
@@ -169,7 +171,7 @@ def batch_of(image, order=RGB, mean=(0.0, 0.0, 0.0), std=(255.0, 255.0, 255.0), 
     return batch
 
 
-def ranked(detections, classes):
+def ranked(detections: Detections, classes: Sequence[int]) -> Detections:
     """Detections of some classes with finite boxes, in order of decreasing score; at most MAX_CANDIDATES."""
     boxes, scores, numbers = detections
     kept = np.flatnonzero(np.isin(numbers, classes) & np.isfinite(boxes).all(axis=1))

@@ -1,4 +1,6 @@
 """Register raw depth messages, with the camera_info of the depth camera and the transform between both cameras."""
+from typing import Optional
+
 import numpy as np
 import tf2_ros
 from sensor_msgs.msg import CameraInfo
@@ -18,8 +20,9 @@ class DepthRegistration(object):
     """
 
     def __init__(self, transforms: TransformBuffer, info_topic: str) -> None:
-        self._transforms, self._info_topic, self._depth_camera = transforms, info_topic, None
-        self._geometry = None
+        self._transforms, self._info_topic = transforms, info_topic
+        self._depth_camera: Optional[Camera] = None
+        self._geometry: Optional[Registration] = None
 
     def add_camera_info(self, message: CameraInfo) -> None:
         """Add a sensor_msgs/CameraInfo of the depth camera; it is used for all images until the next."""
@@ -36,7 +39,7 @@ class DepthRegistration(object):
                              % self._info_topic)
         if depth.shape != (camera.height, camera.width):
             raise ValueError('the depth image has %d x %d pixels, its camera_info on %s %d x %d'
-                             % (depth.shape[::-1] + (self._info_topic,) + camera[:2]))
+                             % (depth.shape[1], depth.shape[0], self._info_topic, camera.width, camera.height))
         try:
             color_from_depth = self._transforms.lookup(color_frame, depth_frame, NEWEST)
         except tf2_ros.TransformException as error:
@@ -46,5 +49,5 @@ class DepthRegistration(object):
         known = self._geometry
         if known is None or (known.color_camera, known.depth_camera) != (color_camera, camera) or not np.array_equal(
                 known.color_from_depth, color_from_depth):
-            self._geometry = Registration(color_camera, camera, color_from_depth)
-        return self._geometry
+            known = self._geometry = Registration(color_camera, camera, color_from_depth)
+        return known

@@ -102,7 +102,7 @@ class RgbdSource(object):
             color, size, stamp_ns = trigger.color, trigger.image_size, trigger.stamp_ns or depth_stamp_ns
         else:
             color = imgmsg_to_rgb(trigger)
-            size, stamp_ns = color.shape[1::-1], trigger.header.stamp.to_nsec()
+            size, stamp_ns = (color.shape[1], color.shape[0]), trigger.header.stamp.to_nsec()
         fault = '' if size is None else info_size_fault(camera, *size, self._info_topic)
         if fault:  # before depth is compared with the camera, too
             raise ValueError(fault)
