@@ -44,8 +44,8 @@ class RolledSimulator(Simulator):
             'duration': 3.0, 'rate': 10.0, 'people': PEOPLE,
             'robot': {'mount': [0.0, 0.0, HEIGHT_M - 0.065], 'pitch': TILT_RAD}}))
 
-    def poses(self, state, camera=0):
-        poses, rolled = super(RolledSimulator, self).poses(state, camera), np.eye(4)
+    def poses(self, state, camera_index=0):
+        poses, rolled = super(RolledSimulator, self).poses(state, camera_index), np.eye(4)
         rolled[:3, :3] = [[np.cos(ROLL_RAD), -np.sin(ROLL_RAD), 0], [np.sin(ROLL_RAD), np.cos(ROLL_RAD), 0], [0, 0, 1]]
         return poses._replace(base_from_camera=poses.base_from_camera.dot(rolled))
 

@@ -65,7 +65,7 @@ def track_frame(tracker, frame, detected, stamp_ns, camera, error_model):
     depth, map_from_camera = DepthImage(frame.depth_mm, 0.001), frame.poses.map_from_camera
     found = boxes3d_of(detected, frame.color, depth, camera, map_from_camera, error_model)
     return tracker.update(stamp_ns, detections_from_boxes(dict(enumerate(found)), map_from_camera),
-                          view_of(depth, camera, map_from_camera, frame.camera))
+                          view_of(depth, camera, map_from_camera, frame.camera_name))
 
 
 def boxes3d_of(detected, color, depth, camera, fixed_from_camera, error_model=None):

@@ -77,7 +77,7 @@ class SimulatedFrame(NamedTuple):
     depth_mm: np.ndarray  # (h, w), uint16, aligned to colour; 0 means no depth
     poses: Poses
     people: List[PersonTruth]
-    camera: str = ''      # its name, '' if there is only one
+    camera_name: str = ''  # '' if there is only one
     objects: Tuple[PersonTruth, ...] = ()  # objects other than people
 
     @property
@@ -96,8 +96,8 @@ class Simulator(object):
 
     def __init__(self, scenario, camera=D435I_COLOR):
         self.scenario, self.camera = scenario, camera
-        self.cameras = [mount.name for mount in scenario.robot.mounts]  # [''] if there is only one
-        self.rate = scenario.rate * len(self.cameras)  # frames per second of all cameras together
+        self.camera_names = [mount.name for mount in scenario.robot.mounts]  # [''] if there is only one
+        self.rate = scenario.rate * len(self.camera_names)  # frames per second of all cameras together
         self.frame_count = int(np.ceil(scenario.duration * self.rate))
         self._room = RenderedRoom(scenario.room.bounds, scenario.room.height, np.random.RandomState(scenario.seed))
         self._furniture = [box(item.size, item.color, np.random.RandomState(number)).moved(item.at + (0,), item.yaw)
@@ -129,7 +129,7 @@ class Simulator(object):
 
     def frame(self, number, state=None):
         """Render a frame. `state` is the WorldState; by default, that of the moves. Returns a SimulatedFrame."""
-        time_s, turn = self.time_s(number), number % len(self.cameras)
+        time_s, turn = self.time_s(number), number % len(self.camera_names)
         state = state or self.state_at(time_s)
         poses, states = self.poses(state, turn), state.people
         bodies = [body.posed(state.posture).moved(np.append(state.position_m, 0), state.heading_rad)
@@ -144,7 +144,7 @@ class Simulator(object):
         truth = [self._truth(index, state, bodies[index], rendering) for index, state in enumerate(states)]
         people, objects = truth[:len(self.bodies)], tuple(truth[len(self.bodies):])
         color = self._color_sensor.capture(rendering.color, number)
-        return SimulatedFrame(number, time_s, color, depth_mm, poses, people, self.cameras[turn], objects)
+        return SimulatedFrame(number, time_s, color, depth_mm, poses, people, self.camera_names[turn], objects)
 
     def state_at(self, time_s):
         """Return the WorldState at a time if the robot and the people follow their moves."""
@@ -152,19 +152,19 @@ class Simulator(object):
         return WorldState(time_s, self._robot.at(time_s), [motion.at(time_s) for motion in self.motions],
                           upright(x, y, 0, yaw))
 
-    def poses(self, state, camera=0):
-        """Poses of odometry, robot and camera in a WorldState. `camera` is the index of the camera."""
+    def poses(self, state, camera_index=0):
+        """Poses of odometry, robot and one of the cameras in a WorldState."""
         robot, (x, y) = self.scenario.robot, state.robot.position_m
-        mount = robot.mounts[camera]
+        mount = robot.mounts[camera_index]
         map_from_base = upright(x, y, robot.base_height, state.robot.heading_rad)
         base_from_mount, tilted = upright(*mount.mount + (mount.yaw,)), np.eye(4)
         tilted[:3, :3] = rotation(1, mount.pitch)
         return Poses(state.map_from_odom, np.linalg.inv(state.map_from_odom).dot(map_from_base),
                      base_from_mount.dot(tilted).dot(FRONT_FROM_OPTICAL))
 
-    def poses_at(self, time_s, camera=0):
+    def poses_at(self, time_s, camera_index=0):
         """Poses at a time if the robot follows its moves, see `poses`."""
-        return self.poses(self.state_at(time_s), camera)
+        return self.poses(self.state_at(time_s), camera_index)
 
     def positions_at(self, time_s):
         """Positions (n, 2) of people and objects in the map by their moves. The time may be after the end of the scene.

@@ -96,11 +96,12 @@ class NavigationTrialNode(object):
         self._sources.append(source)
         rospy.Subscriber(topic, kind, lambda message: self._pace.heard(source, message.header.stamp.to_nsec()))
 
-    def _convert_depth_of(self, camera):
-        cloud_pub = rospy.Publisher(topic_of(camera, 'camera/points'), PointCloud2, queue_size=1)
-        rospy.Subscriber(topic_of(camera, INFO_TOPICS[1]), CameraInfo,
-                         lambda message: self._cameras.update({camera: camera_from_msg(message)}))
-        rospy.Subscriber(topic_of(camera, DEPTH_TOPIC), Image, functools.partial(self._on_depth, camera, cloud_pub),
+    def _convert_depth_of(self, camera_name):
+        cloud_pub = rospy.Publisher(topic_of(camera_name, 'camera/points'), PointCloud2, queue_size=1)
+        rospy.Subscriber(topic_of(camera_name, INFO_TOPICS[1]), CameraInfo,
+                         lambda message: self._cameras.update({camera_name: camera_from_msg(message)}))
+        rospy.Subscriber(topic_of(camera_name, DEPTH_TOPIC), Image,
+                         functools.partial(self._on_depth, camera_name, cloud_pub),
                          queue_size=1, buff_size=2 ** 24)
 
     def run(self):
@@ -170,9 +171,9 @@ class NavigationTrialNode(object):
             self._driving_collisions += was_driving(self._speeds_mps)
         self._collisions = message.data
 
-    def _on_depth(self, camera, cloud_pub, message):
-        if camera in self._cameras:
-            points_m = points_of(imgmsg_to_depth(message), self._cameras[camera])
+    def _on_depth(self, camera_name, cloud_pub, message):
+        if camera_name in self._cameras:
+            points_m = points_of(imgmsg_to_depth(message), self._cameras[camera_name])
             cloud_pub.publish(points_to_msg(points_m, message.header))
             self._pace.heard('cloud', message.header.stamp.to_nsec())
 

@@ -53,8 +53,8 @@ class DrivenRobot(object):
 def robot_transforms(simulator, state, stamp):
     """Convert a WorldState to one TFMessage from the map to all cameras."""
     links = []
-    for index, camera in enumerate(simulator.cameras):
-        chain = transforms_of(simulator.poses(state, index), camera)
+    for index, name in enumerate(simulator.camera_names):
+        chain = transforms_of(simulator.poses(state, index), name)
         links += chain[-1:] if links else chain
     return TFMessage(transform_messages(stamp, links))
 

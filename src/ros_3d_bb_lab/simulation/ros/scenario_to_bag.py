@@ -16,10 +16,10 @@ TRUTH_TOPIC = 'ground_truth'
 MAP_FRAME, ODOM_FRAME, BASE_FRAME = 'map', 'odom', 'base_link'
 
 
-def transforms_of(poses, camera):
+def transforms_of(poses, camera_name):
     """Links (parent, child, parent_from_child (4, 4)) from the map to a camera, given by its name, for `Poses`."""
     return [(MAP_FRAME, ODOM_FRAME, poses.map_from_odom), (ODOM_FRAME, BASE_FRAME, poses.odom_from_base),
-            (BASE_FRAME, frame_id_of(camera), poses.base_from_camera)]
+            (BASE_FRAME, frame_id_of(camera_name), poses.base_from_camera)]
 
 
 def simulated_messages(simulator, frame, stamp_ns):
@@ -27,10 +27,10 @@ def simulated_messages(simulator, frame, stamp_ns):
 
     The occlusion status in the ground truth refers to the camera of the frame.
     """
-    stamp, frame_id = time_from(stamp_ns), frame_id_of(frame.camera)
+    stamp, frame_id = time_from(stamp_ns), frame_id_of(frame.camera_name)
     taken = CameraFrame(Header(stamp=stamp, frame_id=frame_id), simulator.camera, frame.color,
-                        DepthImage(frame.depth_mm, 0.001), transforms_of(frame.poses, frame.camera))
-    messages = [(topic_of(frame.camera, topic) if topic != TF_TOPIC else topic, message)
+                        DepthImage(frame.depth_mm, 0.001), transforms_of(frame.poses, frame.camera_name))
+    messages = [(topic_of(frame.camera_name, topic) if topic != TF_TOPIC else topic, message)
                 for topic, message in messages_of(taken)]
     truth = tracks_to_msg(simulator.true_tracks(frame, stamp_ns), Header(stamp=stamp, frame_id=MAP_FRAME))
     return messages + [(TRUTH_TOPIC, truth)]
@@ -38,8 +38,8 @@ def simulated_messages(simulator, frame, stamp_ns):
 
 def boxes_message(frame, boxes, stamp_ns, labels):
     """Topic and message of 2D boxes (n, 4), integers, with class names, of a frame."""
-    header = Header(stamp=time_from(stamp_ns), frame_id=frame_id_of(frame.camera))
-    return topic_of(frame.camera, BOXES_TOPIC), boxes2d_to_msg(boxes, header, labels, [1.0] * len(boxes))
+    header = Header(stamp=time_from(stamp_ns), frame_id=frame_id_of(frame.camera_name))
+    return topic_of(frame.camera_name, BOXES_TOPIC), boxes2d_to_msg(boxes, header, labels, [1.0] * len(boxes))
 
 
 def scenario_images(scenario, with_boxes=False):

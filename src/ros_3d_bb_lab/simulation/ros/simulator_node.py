@@ -100,14 +100,14 @@ class SimulatorNode(object):
         self._params, = read_params(SimulatorParams)
         self._simulator = Simulator(_scenario(self._params))
         self._diagnostics = Diagnostics()
-        if any(self._simulator.cameras):
+        if any(self._simulator.camera_names):
             rospy.loginfo('the scenario has several cameras; for the pipeline: cameras:=%s',
-                          ','.join(self._simulator.cameras))
-        kinds = {topic_of(camera, topic): kind for camera in self._simulator.cameras for topic, kind in TYPES.items()
+                          ','.join(self._simulator.camera_names))
+        kinds = {topic_of(name, topic): kind for name in self._simulator.camera_names for topic, kind in TYPES.items()
                  if topic != TF_TOPIC}
         kinds[TRUTH_TOPIC] = TrackedObjectArray
         if self._params.boxes:
-            kinds.update((topic_of(camera, BOXES_TOPIC), Int32MultiArray) for camera in self._simulator.cameras)
+            kinds.update((topic_of(name, BOXES_TOPIC), Int32MultiArray) for name in self._simulator.camera_names)
         self._pubs = {topic: rospy.Publisher(topic, kind, queue_size=10) for topic, kind in kinds.items()}
         self._tf_pub = rospy.Publisher('/' + TF_TOPIC, TYPES[TF_TOPIC], queue_size=QUEUE_SIZE)
         self._clock_pub = rospy.Publisher('/clock', Clock, queue_size=QUEUE_SIZE)
@@ -135,9 +135,9 @@ class SimulatorNode(object):
                 self._failed = True
 
     def _play_rounds(self):
-        for camera in self._simulator.cameras:
+        for name in self._simulator.camera_names:
             # The time is published meanwhile, because rosbag and other nodes subscribe only after it is valid.
-            wait_for_subscribers(self._pubs[topic_of(camera, COLOR_TOPIC)], self._params.wait_for_subscribers,
+            wait_for_subscribers(self._pubs[topic_of(name, COLOR_TOPIC)], self._params.wait_for_subscribers,
                                  lambda: self._publish_clock(START_NS))
         start_ns = START_NS + CLOCK_LEAD_NS
         if self._params.supervised:
@@ -153,7 +153,7 @@ class SimulatorNode(object):
     def _stand_still(self, start_ns):
         """Publish the start of the scene until the first time limit. Returns the time of the limit."""
         state, period_ns = self._simulator.state_at(0.0), int(NS / self._simulator.rate)
-        number = itertools.cycle(range(len(self._simulator.cameras)))
+        number = itertools.cycle(range(len(self._simulator.camera_names)))
         for stamp_ns in itertools.count(start_ns, int(STEP_S * NS)):
             if self._limit_ns is not None or rospy.is_shutdown():
                 self._wait_for_image()
