@@ -7,7 +7,6 @@ from typing import Any, Dict, Iterable, List, Optional, Sequence, Tuple
 import genpy
 import numpy as np
 from geometry_msgs.msg import PoseWithCovariance, TransformStamped
-from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header, Int32MultiArray, MultiArrayDimension
 from tf2_msgs.msg import TFMessage
@@ -346,7 +345,7 @@ def _track_from_msg(track: Any) -> TrackedObject:
                          track.label or PERSON, track.score, track.detection)
 
 
-def occupied_from_msg(message: OccupancyGrid) -> OccupiedCells:
+def occupied_from_msg(message: Any) -> OccupiedCells:
     """Convert a nav_msgs/OccupancyGrid to OccupiedCells. Raises ValueError if it is invalid."""
     info, place, turn = message.info, message.info.origin.position, message.info.origin.orientation
     yaw = 2 * np.arctan2(turn.z, turn.w)
