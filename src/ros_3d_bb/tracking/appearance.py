@@ -6,7 +6,7 @@ the body that is hidden, or shows what the person carries, may have any colour, 
 against a track. If other people look alike, their clothes are common at this place, and the evidence is weak.
 """
 import math
-from typing import NamedTuple, Tuple
+from typing import Any, Dict, Iterable, NamedTuple, Optional, Sequence, Tuple
 
 from ros_3d_bb.core.time_sync import NS
 
@@ -24,6 +24,7 @@ RETURN_NS = 300 * NS  # a person who returns later gets a new ID: lights and clo
 RETURN_ODDS = 4.0  # that a new track is the person who has left, and not another one
 RETURN_MPS, RETURN_M = 2.0, 1.0  # people return no faster than this
 MOST_DEPARTED = 50
+Ratios = Tuple[Optional[float], ...]  # of the upper and of the lower body; None: unknown
 
 
 class Appearance(NamedTuple):
@@ -32,7 +33,7 @@ class Appearance(NamedTuple):
     mean: Tuple[float, ...] = (0.0,) * 6
     images: Tuple[int, int] = (0, 0)
 
-    def updated(self, colors):
+    def updated(self, colors: Sequence[float]) -> 'Appearance':
         """The Appearance after an image with these colours."""
         mean, images = list(self.mean), list(self.images)
         for part in (0, 1):
@@ -40,19 +41,19 @@ class Appearance(NamedTuple):
                 images[part] = min(images[part] + 1, MOST_IMAGES)
                 for place in range(3 * part, 3 * part + 3):
                     mean[place] += (colors[place] - mean[place]) / images[part]
-        return Appearance(tuple(mean), tuple(images))
+        return Appearance(tuple(mean), (images[0], images[1]))
 
     @property
-    def is_known(self):
+    def is_known(self) -> bool:
         """Whether the person can be recognised."""
         return max(self.images) >= LEAST_IMAGES
 
     @property
-    def is_new(self):
+    def is_new(self) -> bool:
         """Whether so few images show the person that it may turn out to be another one."""
         return max(self.images) <= LEAST_IMAGES
 
-    def ratios(self, colors):
+    def ratios(self, colors: Sequence[float]) -> Ratios:
         """Likelihood ratios of the colours (6,) of a box, for this person against any other one: of the upper and of
         the lower body, None where it is unknown."""
         return tuple(_ratio(self.mean[start:start + 3], colors[start:start + 3], images)
@@ -60,7 +61,7 @@ class Appearance(NamedTuple):
                      for start, images in zip((0, 3), self.images))
 
 
-def _ratio(mean, colors, images):
+def _ratio(mean: Sequence[float], colors: Sequence[float], images: int) -> float:
     log_ratio = 0.0
     for known, seen, same, other in zip(mean, colors, SAME, OTHER):
         same2, other2 = (1 + 1 / images) * same * same, other * other
@@ -68,7 +69,7 @@ def _ratio(mean, colors, images):
     return (1 - WRONG_SHARE) * math.exp(log_ratio) + WRONG_SHARE
 
 
-def evidence_of_pairs(tracks, measurements):
+def evidence_of_pairs(tracks: Sequence[Any], measurements: Sequence[Any]) -> Dict[Tuple[int, int], float]:
     """The evidence {(number of the track, number of the measurement): log-likelihood ratio} that each pair is one
     person, where both appearances are known, from 0 to `MOST_ALIKE`.
 
@@ -88,12 +89,12 @@ def evidence_of_pairs(tracks, measurements):
     return found
 
 
-def _evidence(ratios, others):
+def _evidence(ratios: Ratios, others: Sequence[Ratios]) -> float:
     """Logarithm of the likelihood ratios of a person, relative to the mean of those of `others` and of anyone else."""
     total = 0.0
     for part, ratio in enumerate(ratios):
         if ratio is not None:
-            alike = [other[part] for other in others if other[part] is not None]
+            alike = [value for value in (other[part] for other in others) if value is not None]
             total += math.log(ratio * (1 + len(alike)) / (1 + sum(alike)))
     return total
 
@@ -112,13 +113,13 @@ class Departed(NamedTuple):
     last_ns: int
 
     @classmethod
-    def of(cls, track):
+    def of(cls, track: Any) -> 'Departed':
         """The Departed of a track."""
         return cls(track.id, track.kind.group, track.first_ns, track.appearance, track.met, track.latest.x,
                    track.latest.y, track.last_ns)
 
 
-def departed_after(departed, deleted, stamp_ns):
+def departed_after(departed: Tuple[Departed, ...], deleted: Iterable[Any], stamp_ns: int) -> Tuple[Departed, ...]:
     """The tuple of people who may return, after the tracks `deleted` end."""
     known = [Departed.of(track) for track in deleted if track.is_confirmed and track.appearance is not None
              and track.appearance.is_known]
@@ -127,7 +128,7 @@ def departed_after(departed, deleted, stamp_ns):
     return tuple([person for person in departed if stamp_ns - person.last_ns < RETURN_NS] + known)[-MOST_DEPARTED:]
 
 
-def meet(tracks):
+def meet(tracks: Iterable[Any]) -> None:
     """Remember that the people of the tracks, which are detected in one image, are different ones."""
     ids = frozenset(track.id for track in tracks if track.is_confirmed)
     for track in tracks:
@@ -135,7 +136,7 @@ def meet(tracks):
             track.met = track.met | ids - {track.id}
 
 
-def returned(track, others, departed):
+def returned(track: Any, others: Iterable[Any], departed: Iterable[Departed]) -> Optional[Departed]:
     """The Departed that a new track shows: one of the `departed`, or of the confirmed tracks `others` that has not been
     seen together with it; None if this is not likely enough.
 
@@ -158,7 +159,7 @@ def returned(track, others, departed):
     return best if likelihood >= RETURN_ODDS else None
 
 
-def _can_return(person, track):
+def _can_return(person: Departed, track: Any) -> bool:
     """Whether a person can have come to the first place of a track."""
     elapsed_s = (track.last_ns - person.last_ns) / NS
     distance_m = math.hypot(person.x - track.latest.x, person.y - track.latest.y)

@@ -1,9 +1,11 @@
 """Places where no track starts: polygons, and occupied cells of a static map. Fixed frame, metres."""
 import json
 import math
-from typing import NamedTuple, Optional, Sequence
+from typing import List, NamedTuple, Optional, Sequence
 
 import numpy as np
+
+from ros_3d_bb.camera.camera_model import Vector
 
 STEP_M = 0.05  # between the points of a line of sight that are looked up in the map
 
@@ -19,7 +21,7 @@ class OccupiedCells(NamedTuple):
     resolution_m: float
     origin: tuple
 
-    def at(self, points_m):
+    def at(self, points_m: np.ndarray) -> np.ndarray:
         """Whether points (n, 2) lie in occupied cells, bool (n,); not outside of the map."""
         x, y, yaw = self.origin
         offsets_m = np.subtract(points_m, (x, y))
@@ -43,26 +45,26 @@ class IgnoredAreas(NamedTuple):
     occupied: Optional[OccupiedCells] = None
     map_depth_m: float = 0.0
 
-    def differs_from(self, other):
+    def differs_from(self, other: 'IgnoredAreas') -> bool:
         """Whether polygons or `map_depth_m` differ from those of other IgnoredAreas."""
         polygons, others = ([polygon.tolist() for polygon in areas.polygons] for areas in (self, other))
         return polygons != others or self.map_depth_m != other.map_depth_m
 
-    def contains(self, position_m, camera_m):
+    def contains(self, position_m: Vector, camera_m: Vector) -> bool:
         """Whether the centre of a box, (2,) or (3,), seen from a camera at (2,) or (3,), lies in an ignored area."""
         x, y = map(float, position_m[:2])
         return any(_is_inside(x, y, polygon) for polygon in self.polygons) or self._is_on_the_map(x, y, camera_m)
 
-    def _is_on_the_map(self, x, y, camera_m):
+    def _is_on_the_map(self, x: float, y: float, camera_m: Vector) -> bool:
         if self.occupied is None:
             return False
         to_camera = np.array([camera_m[0] - x, camera_m[1] - y])
-        distance_m = max(np.linalg.norm(to_camera), 1e-6)
+        distance_m = max(float(np.linalg.norm(to_camera)), 1e-6)
         nearer_m = np.arange(0, min(self.map_depth_m, distance_m) + 1e-9, STEP_M)
         return bool(self.occupied.at((x, y) + np.outer(nearer_m / distance_m, to_camera)).any())
 
 
-def polygons_from(text):
+def polygons_from(text: str) -> List[np.ndarray]:
     """Polygons, a list of arrays (n, 2), from a text such as `[[[1, 2], [3, 2], [3, 4]]]`; none from an empty text.
 
     Raises ValueError if it is not a list of polygons with at least three finite corners each.
@@ -79,7 +81,7 @@ def polygons_from(text):
     return polygons
 
 
-def _is_inside(x, y, polygon):
+def _is_inside(x: float, y: float, polygon: np.ndarray) -> bool:
     """Whether a point lies in a polygon (n, 2): a ray along x crosses its edges an odd number of times."""
     inside = False
     for (x1, y1), (x2, y2) in zip(polygon, np.roll(polygon, -1, axis=0)):

@@ -1,11 +1,13 @@
 """Out-of-sequence measurements: process late images in the order of their stamps, with stable track IDs."""
 import collections
 import functools
-from typing import NamedTuple
+from typing import Any, Callable, Deque, Dict, Iterable, List, NamedTuple, Optional, Tuple
 
 from ros_3d_bb.core.time_sync import MAX_RATE_HZ, NS
-from ros_3d_bb.tracking.types import CameraView
+from ros_3d_bb.tracking.types import CameraView, Detection
 
+Order = Tuple[int, str]  # of processing: by stamp, then by camera
+Match = Tuple[int, bool, int]  # track ID, whether the track was confirmed before, number of the detection
 LATEST_NS = NS // 2  # images that are older than the newest by more than this are rejected; chosen
 MOST_KEPT = LATEST_NS * MAX_RATE_HZ // NS  # maximum number of images in the history, per camera
 MOST_SKIPPED = 1000  # maximum number of skipped images in the history; chosen
@@ -20,11 +22,11 @@ class DetectedImage(NamedTuple):
     """The detections of one image and the camera's view."""
 
     stamp_ns: int
-    detections: tuple
+    detections: Tuple[Detection, ...]
     view: CameraView
 
     @property
-    def order(self):
+    def order(self) -> Order:
         """Sort key of the processing order: stamp, then camera."""
         return self.stamp_ns, self.view.camera
 
@@ -49,15 +51,15 @@ class OutOfSequenceBuffer(object):
         The last assigned ID.
     """
 
-    def __init__(self, step, state, last_id=0):
+    def __init__(self, step: Callable[..., Tuple[Any, List[Match]]], state: Any, last_id: int = 0) -> None:
         self._step, self.state, self.last_id = step, state, last_id
-        self._history = collections.deque()  # (state before, image)
-        self._skipped = collections.deque(maxlen=MOST_SKIPPED)  # (stamp_ns, camera)
-        self._late = []  # (order, image) that wait for a replay; None instead of a skipped image
-        self._late_since_ns = None  # newest stamp when the first of them arrived
-        self._ids = {}  # IDs of new tracks by stamp, camera and number of the detection that started them
+        self._history: Deque[Tuple[Any, DetectedImage]] = collections.deque()  # (state before, image)
+        self._skipped: Deque[Order] = collections.deque(maxlen=MOST_SKIPPED)
+        self._late: List[Tuple[Order, Optional[DetectedImage]]] = []  # wait for a replay; None: a skipped image
+        self._late_since_ns = 0  # newest stamp when the first of them arrived
+        self._ids: Dict[Tuple[int, str, int], int] = {}  # of tracks, by stamp, camera and number of the first detection
 
-    def insert(self, image):
+    def insert(self, image: DetectedImage) -> None:
         """Process an image, or let it wait. Raises ValueError without any change if it is too late or a duplicate."""
         self._check(image.stamp_ns, image.view.camera)
         is_late = bool(self._history) and image.stamp_ns <= self.state.now_ns and (
@@ -69,7 +71,7 @@ class OutOfSequenceBuffer(object):
         if not is_late:
             self._process([image])
 
-    def skip(self, stamp_ns, camera):
+    def skip(self, stamp_ns: int, camera: str) -> None:
         """Skip an image whose detections are unavailable: tracks do not age."""
         self._skipped.append((stamp_ns, camera))
         if any(image.view.camera == camera and (state.now_ns or 0) < stamp_ns < image.stamp_ns
@@ -77,7 +79,7 @@ class OutOfSequenceBuffer(object):
             self._add_late((stamp_ns, camera), None)
             self._replay_if_due(stamp_ns)
 
-    def replay(self):
+    def replay(self) -> None:
         """Process the late images that wait."""
         if not self._late:
             return
@@ -86,12 +88,12 @@ class OutOfSequenceBuffer(object):
         self._late = []
         self._process(sorted(images, key=lambda image: image.order), known_id)
 
-    def _add_late(self, order, image):
+    def _add_late(self, order: Order, image: Optional[DetectedImage]) -> None:
         if not self._late:
             self._late_since_ns = self.state.now_ns
         self._late.append((order, image))
 
-    def _replay_if_due(self, stamp_ns):
+    def _replay_if_due(self, stamp_ns: int) -> None:
         """Replay if this is efficient, or if the late images have waited too long at the stamp of the next image."""
         first = min(order for order, _image in self._late)
         replayed = len(self._late) + sum(image.order > first for _state, image in self._history)
@@ -99,7 +101,7 @@ class OutOfSequenceBuffer(object):
         if has_waited or replayed <= REPLAYED_PER_LATE * len(self._late):
             self.replay()
 
-    def _check(self, stamp_ns, camera):
+    def _check(self, stamp_ns: int, camera: str) -> None:
         now_ns, count = self.state.now_ns, len(self._history) + len(self._late)
         if now_ns is None or (stamp_ns > now_ns and count < MOST_KEPT):
             return
@@ -114,7 +116,7 @@ class OutOfSequenceBuffer(object):
             raise ValueError('stamp %.9f is within %.1f s of those of %d images of camera %r; its clock hangs'
                              % (stamp_ns / NS, LATEST_NS / NS, MOST_KEPT, camera))
 
-    def _rewind(self, order):
+    def _rewind(self, order: Order) -> List[DetectedImage]:
         """Rewind to the state before the images after `order`; return those images."""
         images = []
         while self._history and self._history[-1][1].order > order:
@@ -122,7 +124,7 @@ class OutOfSequenceBuffer(object):
             images.append(image)
         return images
 
-    def _process(self, images, known_id=None):
+    def _process(self, images: Iterable[DetectedImage], known_id: Optional[int] = None) -> None:
         """Process images; `known_id` is the last ID assigned before a rewind, None without a rewind."""
         for image in images:
             self._history.append((self.state, image))
@@ -133,7 +135,7 @@ class OutOfSequenceBuffer(object):
                 self._restore_ids(order, matches, known_id)
         self._forget()
 
-    def _observed_s(self, stamp_ns, camera):
+    def _observed_s(self, stamp_ns: int, camera: str) -> float:
         """Time since the previous image, or since a later skipped image of the same camera, seconds."""
         before_ns = stamp_ns if self.state.now_ns is None else self.state.now_ns
         if not self._skipped:
@@ -141,14 +143,14 @@ class OutOfSequenceBuffer(object):
         skipped_ns = [skipped_ns for skipped_ns, other in self._skipped if other == camera and skipped_ns < stamp_ns]
         return (stamp_ns - max(skipped_ns + [before_ns])) / NS
 
-    def _assign_id(self, order, number):
+    def _assign_id(self, order: Order, number: int) -> int:
         key = order + (number,)
         if key not in self._ids:
             self.last_id += 1
             self._ids[key] = self.last_id
         return self._ids[key]
 
-    def _restore_ids(self, order, matches, known_id):
+    def _restore_ids(self, order: Order, matches: List[Match], known_id: int) -> None:
         """Restore the ID of a track that now starts in a late image, but started in a later image before the rewind."""
         for track_id, was_confirmed, number in matches:
             key = order + (number,)
@@ -159,7 +161,7 @@ class OutOfSequenceBuffer(object):
                     for track in state.tracks:
                         track.id = former if track.id == track_id else track.id
 
-    def _forget(self):
+    def _forget(self) -> None:
         oldest_ns = self.state.now_ns - LATEST_NS - MAX_WAIT_NS
         while self._history[0][1].stamp_ns < oldest_ns:
             self._history.popleft()

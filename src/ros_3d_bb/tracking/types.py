@@ -1,6 +1,6 @@
 """Input and output types of the tracker. Positions and sizes are in the fixed frame (z up), metres."""
 import math
-from typing import Callable, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -38,7 +38,8 @@ class Detection(NamedTuple):
     is_ignored: bool = False
 
 
-def detections_from_boxes(boxes, fixed_from_camera, classes=ObjectClasses()):
+def detections_from_boxes(boxes: Dict[int, Any], fixed_from_camera: np.ndarray,
+                          classes: ObjectClasses = ObjectClasses()) -> List[Detection]:
     """Convert the boxes of an image to a list of Detection in the fixed frame.
 
     The cylinders are upright in the fixed frame, independent of which edge of the image is up: for a camera mounted in
@@ -86,7 +87,7 @@ class CameraView(NamedTuple):
     measured_area: Optional[Callable[[], Tuple[int, int, int, int]]] = None
 
     @property
-    def ahead(self):
+    def ahead(self) -> np.ndarray:
         """Unit vector (2,) of the horizontal direction of the optical axis; of the upper edge of the image for a camera
         that points straight up or down."""
         (_right, up_x, x), (_right, up_y, y) = self.fixed_from_camera[:2, :3].tolist()
@@ -95,7 +96,7 @@ class CameraView(NamedTuple):
         length = math.sqrt(x * x + y * y)
         return np.array((x / length, y / length))
 
-    def bearings(self, positions_m):
+    def bearings(self, positions_m: Any) -> Tuple[np.ndarray, np.ndarray]:
         """Horizontal distances (n,) of positions (n, 2 or 3) from the camera, metres, and their bearings (n,), radians:
         0 straight `ahead`, positive to the left.
         """
@@ -104,7 +105,7 @@ class CameraView(NamedTuple):
         bearings = np.arctan2(ahead[0] * offsets[:, 1] - ahead[1] * offsets[:, 0], offsets.dot(ahead))
         return np.hypot(offsets[:, 0], offsets[:, 1]), bearings
 
-    def outline(self, range_m):
+    def outline(self, range_m: float) -> np.ndarray:
         """Corners (3, 2) of the field of view in the plane: the camera, and the left and right edge at `range_m`."""
         (width, height), ahead = self.intrinsics[:2], self.ahead
         edges_px = (0, height / 2), (width, height / 2), (width / 2, 0), (width / 2, height)
@@ -143,17 +144,17 @@ class TrackedObject(NamedTuple):
     detection: int = NOT_DETECTED
 
 
-def wrapped(angles):
+def wrapped(angles: np.ndarray) -> np.ndarray:
     """Wrap angles to -pi..pi, radians."""
     return angles - 2 * np.pi * np.rint(angles / (2 * np.pi))
 
 
-def prediction_times_s(time_s, step_s):
+def prediction_times_s(time_s: float, step_s: float) -> np.ndarray:
     """Prediction times (steps,) after an image: multiples of `step_s` up to `time_s`, seconds."""
     return step_s * np.arange(1, int(round(time_s / step_s)) + 1)
 
 
-def check_steps(time_s, step_s):
+def check_steps(time_s: float, step_s: float) -> None:
     """Raise ValueError if a prediction up to `time_s` in steps of `step_s`, seconds, is not possible."""
     if not step_s > 0:
         raise ValueError('prediction_step is %g; more than 0 expected' % step_s)
