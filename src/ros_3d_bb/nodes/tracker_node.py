@@ -72,7 +72,7 @@ class TrackerNode(object):
         self._uses_depth = params.use_depth
         if params.use_map:
             subscribe('map', OccupancyGrid, self._on_map, 1, is_irregular=True)
-        self._markers.areas_m = self._stage.ignored_areas
+        self._markers.areas_m = self._stage.ignored.polygons_m
         ReconfigureServer(given, self._reconfigure, part.namespace)
 
     def _subscribe(self, camera_name, params, with_boxes):
@@ -94,7 +94,7 @@ class TrackerNode(object):
         with self._stage.lock:
             self._stage.reconfigure(params, tracking)
             self._markers.reconfigure(marker_params)
-            self._markers.areas_m = self._stage.ignored_areas
+            self._markers.areas_m = self._stage.ignored.polygons_m
 
     def _on_map(self, message):
         with self._diagnostics.receiving('maps'):

@@ -15,8 +15,8 @@ from ros_3d_bb.pipeline.transform_buffer import TransformBuffer
 class DepthRegistration(object):
     """Register raw depth images to the colour camera.
 
-    `transforms` is as for `tracking_stage.TrackingStage`; the latest transform is used, as the cameras are fixed to
-    each other. `info_topic`, that of the depth camera's camera_info, is named in the error message if it is missing.
+    The latest transform is used, as the cameras are fixed to each other. `info_topic`, that of the depth camera's
+    camera_info, is named in the error message if it is missing.
     """
 
     def __init__(self, transforms: TransformBuffer, info_topic: str) -> None:

@@ -65,9 +65,9 @@ def detect_in_color(detector: Any, message: Image, turns: int = 0) -> Tuple[np.n
 class CameraRotation(object):
     """Quarter turns that make the images of one camera upright, from ~image_rotation or tf.
 
-    The transform is looked up in `transforms`, as for `tracking_stage.TrackingStage`, until that from ~floor_frame is
-    available, and not again: the camera is fixed to the robot. It is not used if ~image_rotation is given, or no
-    ~floor_frame. `on_known` is called once no further lookups are necessary.
+    The transform is looked up until that from ~floor_frame is available, and not again: the camera is fixed to the
+    robot. It is not used if ~image_rotation is given, or no ~floor_frame. `on_known` is called once no further lookups
+    are necessary.
     """
 
     def __init__(self, params: Any, transforms: TransformBuffer, on_known: Callable[[], Any] = lambda: None) -> None:

@@ -106,7 +106,7 @@ class PeoplePipeline(object):
     """The CameraPipeline of each camera, and tracking, on a bag. Collects what the nodes would publish.
 
     Networks detect without depth and are therefore outside: their detections are passed to `add_detections`.
-    `transforms` is as for `tracking_stage.TrackingStage`. Raises ValueError if one of the Settings is invalid.
+    Raises ValueError if one of the Settings is invalid.
     """
 
     def __init__(self, settings: Settings, events: EventCounter, transforms: TransformBuffer) -> None:

@@ -34,10 +34,9 @@ class RgbdSource(object):
     see `time_sync.StampSynchronizer`). `on_match` is called with the arguments of `frame` when the messages of one
     stamp are complete.
 
-    `params` has ~depth, ~depth_scale, ~stamp_tolerance, ~frame_id, ~floor_frame and ~image_rotation. `transforms` is as
-    for `tracking_stage.TrackingStage`, for the floor and raw depth; None if neither is used. `topics` are those of the
-    depth images, their camera_info and that of colour, for error messages about missing ones. `cache_s` and
-    `assumed_delay_s` are for the StampSynchronizer.
+    `params` has ~depth, ~depth_scale, ~stamp_tolerance, ~frame_id, ~floor_frame and ~image_rotation. `transforms` are
+    for the floor and raw depth. `topics` are those of the depth images, their camera_info and that of colour, for error
+    messages about missing ones. `cache_s` and `assumed_delay_s` are for the StampSynchronizer.
     """
 
     def __init__(self, params: Any, events: EventCounter, on_match: OnMatch,

@@ -32,9 +32,6 @@ class TrackingFrame(object):
 
     A localisation corrects the pose of `odom` in `map` from time to time (REP 105), and tf2 interpolates between two
     corrections: in `map`, people who stand would move for some images. In `odom`, the pose of the robot is continuous.
-
-    `transforms` is as for `tracking_stage.TrackingStage`; its method `ancestors(frame)` returns the frame and its
-    ancestors in tf, the root last.
     """
 
     def __init__(self, transforms: TransformBuffer, tracking_frame: str, target_frame: str) -> None:

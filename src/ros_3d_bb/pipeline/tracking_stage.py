@@ -2,7 +2,7 @@
 import collections
 import re
 import threading
-from typing import Any, Callable, Deque, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Callable, Deque, Dict, List, NamedTuple, Optional, Tuple
 
 import numpy as np
 import tf2_ros
@@ -80,12 +80,9 @@ class TrackingStage(object):
     nanoseconds) on a clock chosen by the caller. The methods are thread-safe. The constructor and `reconfigure` raise
     ValueError if a parameter is invalid.
 
-    `tracking` has one instance of each of `TRACKING_PARAMS`. The method `lookup(target_frame, source_frame, stamp)` of
-    `transforms` returns target_from_source (4, 4) or raises tf2_ros.TransformException. `on_tracks` is called with the
-    tracks (list of `types.TrackedObject`) after each image and their header, which has the newest stamp and the target
-    frame; `lock` is held meanwhile. The IDs of tracks are greater than `last_id`.
-
-    Attributes: `views`, the `camera_views.CameraViews` of each camera, by its name; and `lock`.
+    `on_tracks` is called with the tracks after each image and their header, which has the newest stamp and the target
+    frame; `lock` is held meanwhile. The IDs of tracks are greater than `last_id`. Attributes:
+    `views` of each camera, by its name, the `ignored` places, and `lock`.
     """
 
     def __init__(self, params: TrackerNodeParams, tracking: TrackingParams, events: EventCounter,
@@ -107,7 +104,7 @@ class TrackingStage(object):
             name: collections.deque(maxlen=RECENT) for name in self.views}
         self._frames: Dict[str, str] = {}  # by camera
         self._frame = TrackingFrame(transforms, params.tracking_frame, params.target_frame)
-        self._ignored = IgnoredPlaces(params, events)
+        self.ignored = IgnoredPlaces(params, events)
         self._poses: Dict[str, ImagePose] = {}  # latest one, by camera
         self._newest_pose: Optional[ImagePose] = None
 
@@ -117,13 +114,8 @@ class TrackingStage(object):
         areas = areas_of(params)
         with self.lock:
             self._tracker.reconfigure(*tracking)
-            if self._ignored.use(areas):
+            if self.ignored.use(areas):
                 self._end_ignored()
-
-    @property
-    def ignored_areas(self) -> Sequence[np.ndarray]:
-        """Polygons, arrays (n, 2) in the target frame, in which no track starts."""
-        return self._ignored.polygons_m
 
     @property
     def views_m(self) -> List[np.ndarray]:
@@ -137,15 +129,15 @@ class TrackingStage(object):
 
         Raises ValueError if it is in another frame than the published tracks.
         """
-        cells = self._ignored.cells_of(message)
+        cells = self.ignored.cells_of(message)
         with self.lock:
-            if self._ignored.use_map(cells):
+            if self.ignored.use_map(cells):
                 self._end_ignored()
 
     def _end_ignored(self) -> None:
         """End the tracks in ignored places, which have started there."""
         if self._newest_pose is not None:
-            self._tracker.delete_at(self._ignored.seen_from(self._poses.values(), self._newest_pose))
+            self._tracker.delete_at(self.ignored.seen_from(self._poses.values(), self._newest_pose))
 
     def add_boxes(self, message: Any, now_ns: int, camera_name: str = '') -> None:
         """Process a BoundingBox3DArray: `on_tracks` is called unless the transform is missing, or the stamp is
@@ -194,7 +186,7 @@ class TrackingStage(object):
         untracked_boxes = self._tracker.untracked_boxes
         detections = detections_from_boxes(boxes, pose.tracking_from_camera, self._classes)
         view = self.views[camera_name].view(message.header, pose.tracking_from_camera)
-        tracks = self._tracker.update(stamp_ns, self._ignored.marked(detections, pose), view)
+        tracks = self._tracker.update(stamp_ns, self.ignored.marked(detections, pose), view)
         self._events.count('images tracked')
         untracked_boxes = self._tracker.untracked_boxes - untracked_boxes
         if untracked_boxes > 0:

@@ -28,8 +28,7 @@ def upright_transform(transforms: 'TransformBuffer', floor_frame: str, camera_fr
     """Return a frame whose z axis points up, and the latest transform (4, 4) from it to a camera: `floor_frame`, or,
     without a transform from it, the root of the tree of the camera, such as map or odom of a robot without base_link.
 
-    Raises tf2_ros.TransformException if there is none: an optical frame as the root does not point up. `transforms` is
-    as for `tracking_frame.TrackingFrame`.
+    Raises tf2_ros.TransformException if there is none: an optical frame as the root does not point up.
     """
     try:
         return floor_frame, transforms.lookup(camera_frame, floor_frame, NEWEST)
