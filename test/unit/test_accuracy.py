@@ -1,12 +1,16 @@
+import json
 import os
 
 import numpy as np
 import pytest
+import yaml
 
 from conftest import DATA
 from ros_3d_bb.estimation.box3d_estimator import estimator_named
 from ros_3d_bb.sessions.session_reader import read_session
+from ros_3d_bb_lab.evaluation import __main__ as command
 from ros_3d_bb_lab.evaluation.accuracy import Estimates, compare, scores_of, with_detected_boxes
+from ros_3d_bb_lab.evaluation.defaults import scenario_path
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 
 REAL_WEIGHTS = pytest.mark.needs(*['torch'] * bool(DATA))
@@ -50,3 +54,28 @@ def test_positions_are_accurate(result):
     assert 0.92 <= ours['coverage_95'] <= (0.98 if DATA else 1.0)
     if DATA:
         assert ours['rmse_x_truncated_m'] <= 0.045 and ours['missed'] <= 3
+
+
+@pytest.fixture(scope='module')
+def simulated(tmp_path_factory):
+    return write_simulated_session(str(tmp_path_factory.mktemp('simulated')), (1.5, 2.5, 3.5), (-0.3, 0.0, 0.3), 1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('words, keys', [
+    (['speed', '--images', '1'], {'ours', 'thesis', 'ratio'}), (['accuracy'], {'ours', 'thesis', 'recorded'}),
+    (['detector'], {'detectors'})])
+def test_the_commands_write_their_results(simulated, tmp_path, words, keys):
+    path = tmp_path / 'result.json'
+    command.main(words + ['--data', simulated, '--json', str(path)])
+    assert keys <= set(json.loads(path.read_text()))
+
+
+@pytest.mark.slow
+def test_a_scene_is_scored_with_each_detector(tmp_path):
+    with open(scenario_path('empty_room')) as stream:
+        scene = dict(yaml.safe_load(stream), duration=0.4, room={}, people=[{'start': [4.0, 0.3]}])
+    (tmp_path / 'scene.yaml').write_text(yaml.safe_dump(scene))
+    command.main(['scenes', str(tmp_path / 'scene.yaml'), '--json', str(tmp_path / 'result.json')])
+    rows = json.loads((tmp_path / 'result.json').read_text())['scenes']
+    assert [(row['detector'], row['recall']) for row in rows] == [('depth', 1), ('exact', 1)]

@@ -1,4 +1,4 @@
-"""Generated pages and files agree with the code, and so do README and doc/. test_readme_*.py run their commands."""
+"""Generated pages and files agree with the code, and so do README and doc/. test_readme.py runs commands."""
 import contextlib
 import glob
 import os
