@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, settings
 
 settings.register_profile('repeatable', derandomize=True, database=None, deadline=None,  # on a busy machine, too
                           suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile('few', settings.get_profile('repeatable'), max_examples=20)
 settings.load_profile('repeatable')
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, HERE)
@@ -32,6 +33,8 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
+    if config.getoption('--leave-out'):  # on other platforms: each function with their libraries, with fewer examples
+        settings.load_profile('few')
     config.addinivalue_line('markers', 'needs(*names): modules and programs that a test needs when it runs')
 
 
