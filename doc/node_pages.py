@@ -1,7 +1,7 @@
 """Pages of nodes, launch files and messages, and the files in config/, from the code.
 
-`./run doc` writes the pages into a copy of the checkout, `./run config` the files in config/. Sources are the docstrings
-of a node's class and of the classes in ros_3d_bb.nodes that it uses, the tables of its parameters
+`./run doc` writes the pages into a copy of the checkout, `./run config` the files in config/. Sources are the
+docstrings of a node's class and of the classes in ros_3d_bb.nodes that it uses, the tables of its parameters
 (`ros_3d_bb.core.params.Param`), and its launch file.
 """
 import ast
