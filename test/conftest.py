@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, settings
 
 settings.register_profile('repeatable', derandomize=True, database=None, deadline=None,  # on a busy machine, too
                           suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile('few', settings.get_profile('repeatable'), max_examples=20)
 settings.load_profile('repeatable')
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, HERE)
@@ -32,6 +33,8 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
+    if config.getoption('--leave-out'):  # on other platforms: each function with their libraries, with fewer examples
+        settings.load_profile('few')
     config.addinivalue_line('markers', 'needs(*names): modules and programs that a test needs when it runs')
 
 
@@ -94,22 +97,10 @@ def official_output(tmp_path_factory):
 
 
 @pytest.fixture(scope='session')
-def reader(tmp_path_factory, weights):
+def reader(tmp_path_factory):
     """Runs the commands of the README."""
     from support.reader import Reader
-    return Reader(tmp_path_factory.mktemp('reader'), weights)
-
-
-@pytest.fixture(scope='session')
-def camera_bag(session_folder, tmp_path_factory):
-    """A bag at 2 Hz of a camera with a person in front of it, with 2D boxes; longer than a detector takes to start."""
-    from ros_3d_bb.bags.bag_writer import session_images, write_bag
-    from ros_3d_bb.sessions.session_reader import read_session
-    session = read_session(session_folder)
-    nearest = sorted(session.frames, key=lambda frame: abs(frame.truth_m[2] - 2.4) + abs(frame.truth_m[0]))
-    path = str(tmp_path_factory.mktemp('camera') / 'camera.bag')
-    write_bag(session_images(session._replace(frames=nearest[:5] * 8), 2.0, with_boxes=True), path)
-    return path
+    return Reader(tmp_path_factory.mktemp('reader'))
 
 
 @pytest.fixture

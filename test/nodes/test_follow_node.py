@@ -18,7 +18,7 @@ from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb_lab.evaluation.latency.latency_probe_node import pid_of
 from support.ros import Recorder, launched, wait_until
 
-FOLLOWED_S = float(os.environ.get('ROS_3D_BB_FOLLOW_S', 25))
+FOLLOWED_S = float(os.environ.get('ROS_3D_BB_FOLLOW_S', 15))
 STARTING_S, LEADER, STOP_S = 60.0, 1, 1.0
 SCENE = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', 'config', 'scenarios', 'follow.yaml')
 

@@ -210,27 +210,19 @@ def cost_at(robot, costmap, people_m, radius_m=0.0):
             for column, row in cells]
 
 
-def test_people_are_in_the_proxemic_costmap_of_another_frame_without_a_gap(robot):
-    """Tracks are in the map, the costmap is in odom, and tf is published at 10 Hz."""
+def test_people_are_in_both_costmaps_without_a_gap_and_leave_no_trail(robot):
+    """As a soft cost of the social layer, and lethal in the local one where the camera sees them. Tracks are in the
+    map, costmaps in odom, and tf is published at 10 Hz."""
     robot.people = two_people
     robot.advance(1.5, is_driven=False)
     robot.social.emptied()
-    robot.advance(6.0, is_driven=False)
-    costs = np.array([cost_at(robot, costmap, two_people(costmap.header.stamp.to_sec() - 1000), 0.3)
-                      for costmap in robot.social.messages])
-    assert len(costs) >= 15 and (costs > 0).all(), costs
-    assert costs.max() < LETHAL  # a soft cost
-
-
-def test_visible_people_are_lethal_in_the_local_costmap_and_leave_no_trail(robot):
-    robot.people = two_people
-    robot.advance(1.5, is_driven=False)
     robot.costmap.emptied()
     robot.advance(6.0, is_driven=False)
-    costmaps = robot.costmap.messages
-    costs = np.array([cost_at(robot, costmap, two_people(costmap.header.stamp.to_sec() - 1000)[1:])
-                      for costmap in costmaps])
-    assert len(costs) >= 15 and (costs == LETHAL).mean() >= 0.95, costs
+    soft, lethal = (np.array([cost_at(robot, costmap, two_people(costmap.header.stamp.to_sec() - 1000), radius_m)
+                              for costmap in recorder.messages])
+                    for recorder, radius_m in ((robot.social, 0.3), (robot.costmap, 0.0)))
+    assert len(soft) >= 15 and (soft > 0).all() and soft.max() < LETHAL, soft
+    assert len(lethal) >= 15 and (lethal[:, 1] == LETHAL).mean() >= 0.95, lethal
     robot.people = lambda _seconds: np.zeros((0, 2))
     robot.advance(1.5, is_driven=False)  # as long as a missed person is published, and a cycle
     assert max(robot.costmap.messages[-1].data) < LETHAL

@@ -6,7 +6,6 @@ the truth.
 import contextlib
 import os
 
-import pytest
 import rosbag
 import yaml
 from rosgraph_msgs.msg import Clock
@@ -101,10 +100,3 @@ def test_time_and_tf_are_published_every_20_ms_and_at_the_images(tmp_path):
     assert times_ns == sorted(set(range(0, NS + 1, NS // 50)) | set(images_ns))
     clock_ns = [(message.clock - stamps[0]).to_nsec() for message in recorders['/clock'].messages]
     assert clock_ns == sorted(clock_ns) and clock_ns[-len(times_ns):] == times_ns
-
-
-@pytest.mark.parametrize('params, reason', [
-    ((), 'no scenario given'), (('scenario:=/nowhere.yaml',), '/nowhere.yaml')])
-def test_invalid_parameters_are_rejected_at_the_start(params, reason):
-    output, _none = started('simulator_node', *params).communicate(timeout=30)
-    assert reason in output and 'Traceback' not in output

@@ -26,7 +26,7 @@ def missing_requirements():
 
 def missing_for(item):
     """Modules and programs that a test needs and that are missing: those of `@pytest.mark.needs('module')`, and torch
-    for the fixture `weights`, also as part of others such as `reader`.
+    for the fixture `weights`.
     """
     names = [name for mark in item.iter_markers('needs') for name in mark.args]
     names += ['torch'] * ('weights' in getattr(item, 'fixturenames', ()))

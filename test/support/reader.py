@@ -31,23 +31,18 @@ CAMERA_DRIVER = """
 
 
 class Reader(object):
-    """Runs blocks of code in a shell in a home folder below `folder`, an empty pathlib.Path.
+    """Runs blocks of code in a shell in a home folder below `folder`, an empty pathlib.Path."""
 
-    `weights` is the path of weights used as yolov5n.pt.
-    """
-
-    def __init__(self, folder, weights):
+    def __init__(self, folder):
         self.home, self.clone, self.etc = folder / 'home', folder / 'home' / 'ros_3d_bb', folder / 'etc'
         self.log, self.cache, self._display = folder / 'log.txt', folder / 'cache', None
         for path in (self.home / 'catkin_ws' / 'src', self.etc, self.clone):
             path.mkdir(parents=True)
         self.log.write_text('')
-        os.symlink(weights, str(self.home / os.path.basename(weights)))
         for name in set(os.listdir(ROOT)) - {'config', '.git'}:
             os.symlink(os.path.join(ROOT, name), str(self.clone / name))
         shutil.copytree(os.path.join(ROOT, 'config'), str(self.clone / 'config'))
         self._put_stand_ins(folder / 'packages')
-        self._replacements = [('/opt/ros/noetic/', '%s/' % self.etc), ('yolov5n.pt', os.path.basename(weights))]
         self._environment = dict(
             os.environ, HOME=str(self.home), USER='reader', READER_LOG=str(self.log), READER_BAG='',
             READER_CLONE=str(self.clone), ROS_3D_BB_CACHE=str(self.cache), ROS_LOG_DIR=str(folder / 'ros_log'),
@@ -65,20 +60,15 @@ class Reader(object):
                           for name in ('requirements.txt', 'requirements_no_deps.txt'))
         (self.cache / 'venv' / 'installed').write_text('%s  -\n' % sha1(wanted).hexdigest())  # the format of sha1sum
 
-    def environment(self, **more):
-        return dict(self._environment, **more)
+    def typed(self, block):
+        """Script of a block, with paths of this machine."""
+        text = block.text.replace('/opt/ros/noetic/', '%s/' % self.etc)
+        return '. %s/stand_ins/reader.sh\n%s' % (SUPPORT, text)
 
-    def typed(self, block, replaced=(), appended=''):
-        """Script of a block, with paths and addresses of this machine."""
-        text = block.text.rstrip('\n') + appended
-        for old, new in tuple(replaced) + tuple(self._replacements):
-            text = text.replace(old, new)
-        return '. %s/stand_ins/reader.sh\n%s\n' % (SUPPORT, text)
-
-    def types(self, block, at=None, replaced=(), appended='', **environment):
-        """Run a block that ends by itself. Returns its output; fails if a command fails."""
-        result = subprocess.run(['bash', '-euo', 'pipefail', '-c', self.typed(block, replaced, appended)],
-                                cwd=str(at or self.home), env=self.environment(**environment), stdin=subprocess.DEVNULL,
+    def types(self, block, at, **environment):
+        """Run a block that ends by itself in a folder. Returns its output; fails if a command fails."""
+        result = subprocess.run(['bash', '-euo', 'pipefail', '-c', self.typed(block)], cwd=str(at),
+                                env=dict(self._environment, **environment), stdin=subprocess.DEVNULL,
                                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
         assert result.returncode == 0, '%s:%d\n%s' % (block.page, block.line, result.stdout)
         return result.stdout
@@ -86,9 +76,9 @@ class Reader(object):
     @contextlib.contextmanager
     def running(self, block, **environment):
         """Run a block until Ctrl-C. Yields a Graph, and ends it."""
-        environment = dict({'ROS_MASTER_URI': 'http://localhost:%d' % free_port()}, **environment)
+        environment = dict(self._environment, ROS_MASTER_URI='http://localhost:%d' % free_port(), **environment)
         with contextlib.ExitStack() as processes:
-            graph = Graph(self.environment(**environment), processes)
+            graph = Graph(environment, processes)
             graph.start(['bash', '-c', self.typed(block)], cwd=str(self.home))
             yield graph
 
@@ -118,11 +108,6 @@ class Graph(object):
     def output(self):
         with open(self._output.name, errors='replace') as stream:
             return stream.read()
-
-    def starts_camera(self, bag):
-        """Play a bag at 5 Hz, as the camera of a robot."""
-        self.waits(self._has_master, 'a master')
-        self.start([sys.executable, os.path.join(ROOT, 'scripts', 'replay_node'), '_bag:=' + bag, '_rate:=5'])
 
     def _has_master(self):
         return rosgraph.is_master_online(self.environment['ROS_MASTER_URI'])

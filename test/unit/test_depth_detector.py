@@ -118,6 +118,7 @@ def test_people_are_detected_beside_the_axis_of_a_fisheye(places_m):
     assert_boxes(room.detections().boxes, [room.visible(person) for person in people], 0.8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('number', [100, 217, 246, 285])
 def test_the_box_of_a_person_with_hidden_legs_extends_to_the_floor(number):
     """In images of the demo, in which two people walk in front of the fourth one."""
@@ -163,6 +164,7 @@ def test_the_last_floor_is_used_if_none_is_visible():
     assert DepthPeople().detect(color, hidden, CAMERA) is None
 
 
+@pytest.mark.slow
 def test_a_person_who_crouches_stays_detected():
     simulator = Simulator(read_scenario(scenario_path('following_robot')))
     detect = depth_detector(simulator)
@@ -173,6 +175,7 @@ def test_a_person_who_crouches_stays_detected():
         assert any(left < column < right for left, _top, right, _bottom in detect(frame).boxes.tolist()), number
 
 
+@pytest.mark.slow
 def test_a_person_whom_someone_passes_stays_detected():
     simulator = Simulator(scenario_from({'duration': 3.0, 'rate': 10.0, 'seed': 3, 'people': [
         {'start': [3.6, 0.0], 'facing': 3.1, 'moves': [{'wait': 10.0}]},
@@ -186,6 +189,7 @@ def test_a_person_whom_someone_passes_stays_detected():
     assert least_visible < 0.35
 
 
+@pytest.mark.slow
 def test_a_person_half_a_metre_from_a_camera_stays_at_the_place():
     """Only a part at the border of the image is far enough for the depth camera."""
     simulator = Simulator(read_scenario(scenario_path('approach_high_mount')))
@@ -198,6 +202,7 @@ def test_a_person_half_a_metre_from_a_camera_stays_at_the_place():
     assert np.linalg.norm(tracks[0].position_m[:2] - person.position_m[:2]) < 0.2 and tracks[0].status == VISIBLE
 
 
+@pytest.mark.slow
 def test_a_robot_that_drives_up_to_a_person_does_not_lose_the_legs():
     """Its camera is that of a Jackal. At 1.2 m it sees no more than the legs."""
     simulator = Simulator(scenario_from({

@@ -12,7 +12,7 @@ from ros_3d_bb.tracking.measurement_model import DEFAULT_RANGE_M, learned_range
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb_lab.evaluation.noise import __main__ as command
-from ros_3d_bb_lab.evaluation.noise.recordings import fit_recordings, lasting_errors
+from ros_3d_bb_lab.evaluation.noise.recordings import lasting_errors
 from ros_3d_bb_lab.evaluation.tracking.recorded_detections import RecordedRun
 from ros_3d_bb_lab.evaluation.tracking.run_generator import Image, RunTruth
 from support.people import VIEW, at, play
@@ -42,8 +42,12 @@ def run():
     return RecordedRun('made', tuple(taken), None)
 
 
-def test_errors_detections_and_range_of_a_recording_are_measured(run):
-    model = fit_recordings([run], 'made', 'none')
+@pytest.mark.slow
+def test_the_command_measures_errors_detections_and_range_of_a_recording(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(command, 'read_recordings', lambda folder: [run])
+    monkeypatch.setattr(sys, 'argv', ['./run noise', '--recordings', 'made', '--out', str(tmp_path / 'out')])
+    command.main()
+    model = read_error_model(tmp_path / 'out' / 'error_model.yaml')
     detector = model.detector
     assert detector.lasting_sigma_m == pytest.approx(LASTING_M, rel=0.15)
     assert detector.correlation_time_s == pytest.approx(TIME_S, rel=0.35)
@@ -62,14 +66,6 @@ def test_long_recordings_fit_into_memory():
     tracemalloc.stop()
     assert peak < 1e8  # it grew with the square of the number of errors, to 10 times as much here
     assert lasting_m == pytest.approx(0.1, abs=0.03) and 0.05 < time_s < 1
-
-
-def test_the_command_writes_the_model(tmp_path, monkeypatch, capsys, run):
-    monkeypatch.setattr(command, 'read_recordings', lambda folder: [run])
-    monkeypatch.setattr(sys, 'argv', ['./run noise', '--recordings', 'made', '--out', str(tmp_path / 'out')])
-    command.main()
-    detector = read_error_model(tmp_path / 'out' / 'error_model.yaml').detector
-    assert detector.max_range_m == RANGE_M and 'max_range_m: 12' in capsys.readouterr().out
 
 
 def test_the_range_is_learned_from_people_farther_away():

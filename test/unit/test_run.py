@@ -23,7 +23,7 @@ def test_help_starts_nothing(arguments):
 
 @pytest.mark.parametrize('arguments', [
     ('tset',), ('test', '--quick'), ('test', '--fast', 'x'), ('test', '--platform'), ('test', '--platform', 'kinetic'),
-    ('test', 'missing.py'), ('test', '-k'), ('build', 'x'), ('setup', 'x'), ('lint', '--all'),
+    ('test', 'missing.py'), ('test', '-k'), ('build', 'x'), ('config', 'x'), ('lint', '--all'),
     ('planners', 'x'), ('doc', '--theme'), ('doc', 'site', 'x'),
     ('demo', '--fast'), ('demo', 'missing'), ('demo', 'rate:=fast'), ('demo', 'weights:=missing.pt')])
 def test_unknown_arguments_are_errors(arguments):

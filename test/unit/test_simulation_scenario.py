@@ -54,22 +54,6 @@ def test_errors_name_the_path_of_a_key(where, name):
         assert text.startswith('%s.%s' % (where, name)) and ('expected' in text or 'unknown key' in text)
 
 
-# The second to last entry is the value in the message, the last one the limit or type that is expected.
-@pytest.mark.parametrize('where,name,value,quoted,expected', [
-    ('scenario', 'duration', 0, '0', 'more than 0'),
-    ('scenario', 'rate', 5000, '5000', '1000'),
-    ('scenario', 'seed', True, 'True', 'number'),
-    ('scenario.room', 'bounds', [0, 1, 2], '[0, 1, 2]', '4 numbers'),
-    ('scenario.room.furniture[2]', 'color', [1, 2, 256], '256', '255'),
-    ('scenario.robot.follow', 'person', .5, '0.5', 'integer'),
-    ('scenario.people[1]', 'crouch', 1.1, '1.1', '0 to 1'),
-    ('scenario.people[1].moves[1]', 'wait', -1, '-1', 'at least 0')])
-def test_the_error_of_a_value_out_of_range_names_path_value_and_limit(where, name, value, quoted, expected):
-    key, _verb, rest = error_of(content_with(where, name, value)).split(' ', 2)
-    assert key.partition('[')[0] == ('%s.%s' % (where, name)).partition('[')[0] and name in key
-    assert rest.split('; ')[0] == quoted and expected in rest.split('; ')[1]
-
-
 def test_values_are_read_into_their_attributes():
     scenario = scenario_from({
         'duration': 3, 'rate': 10, 'seed': 2 ** 32 - 1, 'depth_noise': False, 'color_noise': 0,

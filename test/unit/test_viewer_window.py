@@ -7,7 +7,7 @@ from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.sessions.snapshots import ColorImage, Snapshot
 from ros_3d_bb.visualization.cv_window import character_of
 from ros_3d_bb.visualization.image_overlay import BOX_COLOR, colorize_depth, depth_to_grey
-from ros_3d_bb.visualization.viewer_layout import RATE_WINDOW_NS, FrameRate, box_lines, compose
+from ros_3d_bb.visualization.viewer_layout import RATE_WINDOW_NS, FrameRate, compose
 
 BOX = Box3D(np.array([0.5, -0.25, 2.0]), np.array([0.5, 1.75, 0.5]), (100, 40, 200, 160), 0.75,
             (True,) * 4)
@@ -42,11 +42,6 @@ def test_near_depth_is_bright_far_depth_is_dark_and_no_depth_is_black():
     assert grey[0] == 0 and grey[1] > grey[2] > grey[3] > 0
     unknown = DepthImage(np.array([[np.nan, np.inf, -1]], np.float32), 1.0)
     assert depth_to_grey(unknown, 6.0)[0].tolist() == [0, 0, 0]
-
-
-def test_positions_are_shown_as_text():
-    line, = box_lines((BOX,))
-    assert line == '1: x +0.50  y -0.25  z 2.00 m,  0.50 m wide, 1.75 m high, truncated'
 
 
 def test_the_frame_rate_is_that_of_recent_images_and_its_memory_is_limited():

@@ -93,7 +93,7 @@ def test_results_are_written_and_no_process_remains(tmp_path):
     scene, results = {'duration': 0.4, 'rate': 20.0, 'people': people}, str(tmp_path / 'latency.json')
     bag = scene_bag(tmp_path / 'images.bag', scene, with_boxes=True)
     printed = subprocess.check_output(
-        [sys.executable, '-m', 'ros_3d_bb_lab.evaluation', 'latency', '--bag', bag, '--cases', 'free', '--seconds', '5',
+        [sys.executable, '-m', 'ros_3d_bb_lab.evaluation', 'latency', '--bag', bag, '--cases', 'free', '--seconds', '2',
          '--rate', '10', '--separate', '--json', results], universal_newlines=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # background jobs of a script ignore it
         env=dict(os.environ, ROS_HOSTNAME='localhost', ROS_LOG_DIR=str(tmp_path)))

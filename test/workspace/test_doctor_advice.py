@@ -120,7 +120,6 @@ CASES = {
     'tf 3 s ahead': ('moving', B.tf_delayed(3.0), 'transforms'),
     'tf 3 s behind': ('moving', B.tf_delayed(-3.0), 'transforms'),
     'no tf': ('level', B.without('/tf'), ''), 'no tf, tilted': ('tilted', B.without('/tf'), ''),
-    'no map': ('level', B.with_frames({'map': None}), ''),
     'depth 0.25 mm': ('level', B.with_unit(4), 'depth unit'), 'depth cm': ('level', B.with_unit(0.1), 'depth unit'),
     'depth mm as 32FC1': ('level', B.with_unit(1, '32FC1'), 'depth encoding'),
     'wrong frame': ('level', B.in_frame('camera_rgb_optical_frame'), ''),

@@ -17,9 +17,10 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope='module')
 def run(tmp_path_factory):
-    """[(truth, 3D boxes, tracks)] of the images of config/scenarios/objects.yaml."""
+    """[(truth, 3D boxes, tracks)] of the first 5 s of config/scenarios/objects.yaml."""
     source, target = (str(tmp_path_factory.mktemp('bags') / name) for name in ('in.bag', 'out.bag'))
-    write_bag(scenario_images(read_scenario(scenario_path('objects')), with_boxes=True), source)
+    scenario = read_scenario(scenario_path('objects'))._replace(duration=5.0)
+    write_bag(scenario_images(scenario, with_boxes=True), source)
     process_bag(source, target, with_params(Settings(detector='none'), 'bbox3d', error_model=SIMULATED_ERROR_MODEL))
     found = messages_in(target)
     return list(zip(*(found['/' + topic] for topic in (TRUTH_TOPIC, BOXES3D_TOPIC, TRACKS_TOPIC))))
@@ -35,7 +36,7 @@ def test_each_object_is_one_track_with_its_label(run):
     assert sorted(label for _id, label in published) == LABELS  # one track each, whose label never changes
     for found in scores.people:
         assert (found.ids[0], labels[found.person]) in published and len(found.ids) == 1
-        assert found.detected > 0.95 and found.rmse_m <= 0.08, labels[found.person]
+        assert found.detected > 0.9 and found.rmse_m <= 0.08, labels[found.person]
 
 
 def test_tracks_name_the_box_that_they_were_detected_as(run):

@@ -1,4 +1,6 @@
+import contextlib
 import filecmp
+import io
 import os
 import re
 import signal
@@ -46,10 +48,11 @@ def session_bag(session_folder, tmp_path):
 
 def run_tool(*arguments):
     """Output of the command, which must succeed."""
-    result = subprocess.run(['rosrun', 'ros_3d_bb', 'process_bag'] + [str(argument) for argument in arguments],
-                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
-    assert result.returncode == 0, result.stdout
-    return result.stdout
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed), pytest.raises(SystemExit) as ended:
+        main([str(argument) for argument in arguments])
+    assert not ended.value.code, printed.getvalue()
+    return printed.getvalue()
 
 
 def test_people_are_tracked_and_the_input_is_kept(scene, tmp_path):
@@ -69,7 +72,8 @@ def test_people_are_tracked_and_the_input_is_kept(scene, tmp_path):
 
 
 def test_equal_bags_give_the_same_bytes(scene, tmp_path):
-    run_tool(scene, tmp_path / 'tool.bag', '--detector', 'depth')
+    subprocess.check_call(['rosrun', 'ros_3d_bb', 'process_bag', scene, str(tmp_path / 'tool.bag'), '--detector',
+                           'depth'])
     process_bag(scene, str(tmp_path / 'alone.bag'), DEPTH)
     assert filecmp.cmp(str(tmp_path / 'alone.bag'), str(tmp_path / 'tool.bag'), shallow=False)
 
