@@ -10,8 +10,6 @@ from ros_3d_bb.tracking.appearance import MOST_ALIKE, evidence_of_pairs
 from ros_3d_bb.tracking.kalman_filter import as_outlier, weighted
 from ros_3d_bb.tracking.track import LEGS_M, MIN_TRACK_SCORE, Track, log_odds_of, log_odds_of_arrival
 
-RECENT_NS = 6 * NS // 10  # tracks matched less than this ago are associated before the others; chosen
-UNSURE_SHARE = 0.1  # upper bound of the new-target density, relative to the peak density of the detection; chosen
 HEAD_SIGMAS = 2.0  # standard deviation of the head top relative to that of the height; chosen: the camera tilts
 # Cost of a box whose top matches but whose height does not, as its legs are occluded; and if its lower end is so much
 # higher than the feet that it is hardly another person. Chosen: heights of people differ by less.
@@ -25,27 +23,20 @@ SAME_PERSON_M = 0.15  # two people who are both visible cannot be this close to 
 LOG_TWO_PI = math.log(2 * math.pi)
 
 
-def associate(tracks, measurements, stamp_ns, params, outliers):
-    """Assign measurements to tracks in a cascade: recently matched, then missed, then tentative tracks.
+def associate(tracks, measurements, params, outliers):
+    """Assign measurements to tracks.
 
     A pair is allowed only if the track explains the measurement better than a new target does (the gate), and both
-    have the same group of classes. Of the allowed pairs, those are selected that explain all measurements best, with a
-    new target where no pair is left. `params` are `tracker.TrackerParams`, `outliers` their OutlierModel. Returns a
+    have the same group of classes. Of the allowed pairs, those are selected that explain all measurements best, first of
+    the confirmed tracks, with a new target where no pair is left. `params` are `tracker.TrackerParams`, `outliers` their OutlierModel. Returns a
     list of (Track, Measurement).
     """
-    matches, ranks, taken = [], {}, set()
     costs, nearer = allowed_costs(tracks, measurements, params, outliers)
-    for pair, cost in costs.items():
-        track = tracks[pair[0]]
-        rank = int(stamp_ns - track.last_ns >= RECENT_NS) if track.is_confirmed else 2
-        ranks.setdefault(rank, {})[pair] = cost
-    for rank in sorted(ranks):
-        costs = {pair: cost for pair, cost in ranks[rank].items() if pair[1] not in taken} if taken else ranks[rank]
-        for row, column in costs if len(costs) == 1 else _assigned(costs):
-            track, measurement = tracks[row], measurements[column]
-            matches.append((track, measurement._replace(is_nearer=True) if (row, column) in nearer else measurement))
-            taken.add(column)
-    return matches
+    pairs = _assigned({pair: cost for pair, cost in costs.items() if tracks[pair[0]].is_confirmed})
+    taken = set(column for _row, column in pairs)
+    pairs += _assigned({pair: cost for pair, cost in costs.items()
+                        if not tracks[pair[0]].is_confirmed and pair[1] not in taken})
+    return [(tracks[row], measurements[column]._replace(is_nearer=(row, column) in nearer)) for row, column in pairs]
 
 
 def allowed_costs(tracks, measurements, params, outliers):
@@ -76,14 +67,13 @@ def _gate(measurement, new_target_density, outliers, evidence):
     above this cost from the distance `factor` * sqrt(tr P) + `reach` on, where P is the covariance of the position of
     the track.
 
-    The cost of a new target is -log of its density; at least that of a measurement whose own noise makes every density
-    low: an uncertain detection fits a new target and a track about equally well, and the track takes precedence. The
-    density of a Gaussian at the distance d of its mean is at most exp(-d² / (2 tr S)) / (2 pi sqrt(det R)), where R
-    is the noise and S = P + R the covariance of the innovation; the square root of tr S is at most the sum of those of
-    tr P and tr R. Outliers are nearer by their offset, and have a larger R.
+    The cost of a new target is -log of its density. The density of a Gaussian at the distance d of its mean is at most
+    exp(-d² / (2 tr S)) / (2 pi sqrt(det R)), where R is the noise and S = P + R the covariance of the innovation; the
+    square root of tr S is at most the sum of those of tr P and tr R. Outliers are nearer by their offset, and have a
+    larger R.
     """
     determinant = measurement.xx * measurement.yy - measurement.xy * measurement.xy
-    limit = -math.log(min(new_target_density, UNSURE_SHARE / (2 * math.pi * math.sqrt(determinant)))) + evidence
+    limit = evidence - math.log(new_target_density)
     factor = math.sqrt(max(2 * (limit - LOG_TWO_PI) - math.log(determinant), 0))
     reach = factor * math.sqrt(measurement.xx + measurement.yy + outliers.spread_m2) + outliers.offset_m
     return limit, factor, reach

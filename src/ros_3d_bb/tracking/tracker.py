@@ -176,7 +176,7 @@ class Tracker(object):
         period_s = (image.stamp_ns - latest.stamp_ns) / NS if latest else None
         tracks = self._predict(before, image.stamp_ns)
         measurements = self._measure(before, image, period_s)
-        matches = associate(tracks, measurements, image.stamp_ns, self._params[0], self._rules.outliers)
+        matches = associate(tracks, measurements, self._params[0], self._rules.outliers)
         if len(matches) < len(measurements) and latest:
             matches += match_manoeuvres(tracks, measurements, matches, latest.stamp_ns, image.stamp_ns,
                                         self._params[0].height_sigma)
