@@ -121,16 +121,15 @@ class _End(NamedTuple):
 
 
 class LatestBox(NamedTuple):
-    """Position of the latest detection, and the height of its upper end, or of the image border that truncates it."""
+    """Position of the latest detection."""
 
     x: float
     y: float
-    head_m: float
 
     @classmethod
     def of(cls, measurement):
         """The LatestBox of a Measurement."""
-        return cls(measurement.x, measurement.y, measurement.z + measurement.size_m[2] / 2)
+        return cls(measurement.x, measurement.y)
 
 
 class Track(object):
