@@ -31,13 +31,16 @@ def measured(random, count):
 
 
 def scene(seed):
-    """Tracks, some not detected for seconds, and measurements; parameters and their outlier model."""
+    """Tracks, some not detected for seconds, measurements, and log odds of detection; parameters and their outlier
+    model.
+    """
     random = np.random.RandomState(seed)
     params = TrackerParams(outlier_share=random.choice([0.0, 0.1, 0.9]), outlier_offset=random.uniform(0, 2),
                            outlier_spread=random.uniform(0, 2), new_target_density=10 ** random.uniform(-9, 1))
     tracks = [Track(number, measurement, 0, '', random.uniform(0, 1), 0.0).predicted(random.uniform(0, 4), 0.08)
               for number, measurement in enumerate(measured(random, random.randint(0, 8)))]
-    return tracks, measured(random, random.randint(0, 8)), params, outlier_model(params)
+    log_odds = random.choice([0.0, 2.2, 9.0], len(tracks)).tolist()
+    return tracks, measured(random, random.randint(0, 8)), log_odds, params, outlier_model(params)
 
 
 @given(SEEDS)
@@ -68,5 +71,5 @@ def test_a_newcomer_does_not_push_a_person_to_the_track_of_another_one():
     tracks = [Track(number, measurement, 0, '', 0.8, 0.0).predicted(unseen_s, 0.08)
               for number, measurement, unseen_s in zip((1, 2), people_at(0.0, 0.4), (0.1, 0.3))]
     boxes = people_at(0.05, -0.3)
-    assert set(allowed_costs(tracks, boxes, params, outliers)[0]) == {(0, 0), (0, 1), (1, 0)}
-    assert associate(tracks, boxes, 0, params, outliers) == [(tracks[0], boxes[0])]
+    assert set(allowed_costs(tracks, boxes, [0.0, 0.0], params, outliers)[0]) == {(0, 0), (0, 1), (1, 0)}
+    assert associate(tracks, boxes, [0.0, 0.0], params, outliers) == [(tracks[0], boxes[0])]

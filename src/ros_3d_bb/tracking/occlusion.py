@@ -74,37 +74,53 @@ def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_p
     before = {track.id: track for track in before}
     occluding = [track for track in tracks if track.is_confirmed and track.missed_s < OCCLUDING_S]
     image, others = cameras[camera], recent_others(cameras, camera, cameras[camera].stamp_ns)
-    seen = _visibilities(missed, occluding, image)
-    former = _former_visibilities([track for track in missed if seen[track.id] == VISIBLE], before, occluding, image)
+    seen, staying = _seen_and_staying(missed, before, occluding, image, others)
+    views, decay = [image.view] + [other.view for other in others.values()], math.exp(-observed_s / STOPPING_S)
+    for track in missed:
+        track.set_visibility(camera, seen[track.id], image.stamp_ns)
+        best = min([seen[track.id]] + [track.visibility.get(name, OUT_OF_VIEW) for name in others])
+        is_known = track.is_confirmed and image.stamp_ns - track.last_ns <= PRESENT_NS
+        if best in (PRESENT, STAYED) and not is_known:
+            best = OUT_OF_VIEW
+        _hold(track, before[track.id].state, best, track.id in staying, views, decay)
+        track.miss(STATUS[best], 0.0 if best in (PRESENT, STAYED, SEEN) else observed_s,
+                   observed_s if best == VISIBLE else 0.0, detection_probability)
+
+
+def _seen_and_staying(missed, before, occluding, image, others):
+    """The visibility {ID: visibility} of missed tracks in the view of a CameraState, and the IDs of those that stay
+    behind an occluder, in this one or in those of the `others` {name: CameraState}.
+    """
+    seen, former = _now_and_before(missed, before, occluding, image)
     staying = set(track.id for track in missed if track.status == former.get(track.id) == OCCLUDED)
     seen.update(dict.fromkeys(staying, OCCLUDED))
     seen.update({track_id: STAYED for track_id, visibility in former.items() if visibility in (PRESENT, STAYED)})
     for name, other in others.items():
-        # The person may also stay behind what occludes the view of another camera.
         hidden = [track for track in missed if track.status == track.visibility.get(name) == OCCLUDED
                   and seen[track.id] != VISIBLE]
-        there = _visibilities(hidden, occluding, other)
-        former = _former_visibilities([track for track in hidden if there[track.id] == VISIBLE], before, occluding,
-                                      other)
+        _there, former = _now_and_before(hidden, before, occluding, other)
         staying.update(track_id for track_id, visibility in former.items() if visibility == OCCLUDED)
-    views = [image.view] + [other.view for other in others.values()]
-    for track in missed:
-        track.set_visibility(camera, seen[track.id], image.stamp_ns)
-        best = min([seen[track.id]] + [track.visibility.get(name, OUT_OF_VIEW) for name in others])
-        is_there = best in (PRESENT, STAYED)
-        if is_there and not (track.is_confirmed and image.stamp_ns - track.last_ns <= PRESENT_NS):
-            best, is_there = OUT_OF_VIEW, False
-        if best == STAYED or best == PRESENT and not track.is_moving:
-            _stop(track, before[track.id].state, math.exp(-observed_s / STOPPING_S))
-        elif best == PRESENT:
-            track.state = State(*(track.state[:4] + _bounded(track.state, before[track.id].state, PRESENT_M)))
-        elif best == OCCLUDED and track.id in staying:  # at the previous position
-            former = before[track.id].state
-            track.state = State(*(former[:4] + _bounded(track.state, former, BEHIND_M)))
-        elif best == OUT_OF_VIEW and any(_meets(track, before[track.id].state, view) for view in views):
-            _stop(track, before[track.id].state, math.exp(-observed_s / STOPPING_S))
-        track.miss(STATUS[best], 0.0 if is_there or best == SEEN else observed_s,
-                   observed_s if best == VISIBLE else 0.0, detection_probability)
+    return seen, staying
+
+
+def _now_and_before(tracks, before, occluding, image):
+    """The `_visibilities` of tracks, and of those that should be visible, the `_former_visibilities`."""
+    seen = _visibilities(tracks, occluding, image)
+    return seen, _former_visibilities([track for track in tracks if seen[track.id] == VISIBLE], before, occluding,
+                                      image)
+
+
+def _hold(track, former, seen, is_staying, views, decay):
+    """Keep an undetected track near its former State where its visibility `seen` shows that the person has not gone on;
+    `decay` is the share of the velocity that one who stops keeps."""
+    if seen == STAYED or seen == PRESENT and not track.is_moving:
+        _stop(track, former, decay)
+    elif seen == PRESENT:
+        track.state = State(*(track.state[:4] + _bounded(track.state, former, PRESENT_M)))
+    elif seen == OCCLUDED and is_staying:  # at the previous position
+        track.state = State(*(former[:4] + _bounded(track.state, former, BEHIND_M)))
+    elif seen == OUT_OF_VIEW and any(_meets(track, former, view) for view in views):
+        _stop(track, former, decay)
 
 
 def contradicting_cameras(tracks, stamp_ns):
