@@ -55,37 +55,22 @@ def _nothing(*_arguments):
     return None
 
 
-def _uncompleted(low, high, *_arguments):
-    return low, high
-
-
 MECHANISMS = tuple(Mechanism(*row) for row in (
-    ('order of objects by layers beside', 'estimation.overlaps', 'MOST_TIES', -1000),
+    ('order of objects', 'estimation.overlaps', 'Overlaps._is_nearer', lambda *_: False),
     ('masks of nearer objects', 'estimation.overlaps', 'Overlaps.mask_behind', _nothing),
-    ('limits for crowds', 'estimation.overlaps', 'MANY', 10 ** 9),
-    ('object above a lower one', 'estimation.depth_samples', 'RectSamples._layer_above', _nothing),
-    ('outline of the rectangle', 'estimation.depth_samples', 'LEAST_OUTLINE', 10 ** 9),
-    ('weights of rows', 'estimation.depth_samples', '_ROW_WEIGHTS',
-     [np.ones((rows, 1)) for rows in range(1000)]),
-    ('weights of columns', 'estimation.depth_samples', '_column_weights',
-     lambda _first, _width, _step, count: np.ones(count)),
+    ('outline of the rectangle', 'estimation.depth_samples', 'LEAST_INSIDE', 1.0),
+    ('weights of rows', 'estimation.depth_samples', 'LOWER_WEIGHT', 1.0),
     ('nearest dominant layer', 'estimation.depth_samples', 'FIRST_LAYER_SHARE', 1.0),
     ('background that fills the sides', 'estimation.depth_samples', 'RectSamples.fill_sides', lambda *_: False),
     ('unknown depth in the middle', 'estimation.depth_samples', 'RectSamples.surround_unknown', lambda *_: False),
-    ('least weight of a layer', 'estimation.box3d_estimator', 'LEAST_SHARE', 0.0),
     ('least support', 'estimation.box3d_estimator', 'LEAST_SUPPORT', 0.0),
     ('least number of depths', 'estimation.box3d_estimator', 'LEAST_MEASURED', 0.0),
-    ('ends of people who bend', 'estimation.box3d_estimator', 'BENT_M', math.inf),
-    ('mean distance of ends', 'estimation.box3d_estimator', 'BENT_M', 0.0),
     ('raised arms', 'estimation.box3d_estimator', 'TALL_M', math.inf),
-    ('axis near the trunk', 'estimation.box3d_estimator', 'BESIDE_TRUNK_M', math.inf),
-    ('mean shift', 'estimation.depth_samples', 'middle_of_trunk', lambda _positions, middle_m: middle_m),
-    ('hips', 'estimation.depth_samples', 'HIPS', 1.0),
-    ('floor beside the feet', 'estimation.box3d_estimator', 'LOOKS_DOWN', 9.0),
     ('level frame', 'estimation.box3d_estimator', 'MAX_TILT_RAD', 0.0),
     ('wider rectangles of near people', 'estimation.box3d_estimator', '_widened',
      lambda samples, *_arguments: samples.rect_px),
-    ('completion at the image border', 'estimation.box3d_estimator', 'complete_truncated_extent', _uncompleted),
+    ('completion at the image border', 'estimation.box3d_estimator', 'complete_truncated_extent',
+     lambda low, high, *_arguments: (low, high)),
     ('border in proportion to the box', 'estimation.box3d', 'BORDER_SHARE', 0.0),
     ('uncertainty of little support', 'estimation.error_model', 'SUPPORT_SIGMAS_M', (0.0, 0.0, 0.0)),
     ('uncertainty at the image border', 'estimation.error_model', 'TRUNCATED_SIGMAS_M', (0.0, 0.0, 0.0)),
