@@ -5,7 +5,6 @@ millimetres in arrays of 16 bits, `UNKNOWN_MM` without depth, without a viewing 
 position among the sorted distances, nearest first.
 """
 import functools
-import math
 from bisect import bisect_left, bisect_right
 from typing import NamedTuple
 
@@ -16,53 +15,26 @@ from ros_3d_bb.camera.images import FARTHEST_M
 # Largest numbers of rows and columns; on average, two thirds of them are sampled. Measured: positions are as accurate
 # as with 2000 to 8000 samples (./run bench accuracy).
 GRID_ROWS, GRID_COLUMNS = 48, 32
-ACROSS, DOWN, AHEAD = 0, 1, 2  # axes of the level frame
-# The lower part of a rectangle, where something may stand before the legs, has less weight. Chosen so that no person
-# behind the dog of config/scenarios/objects.yaml is taken for the dog.
-UPPER_SHARE, LOWER_WEIGHT = 0.55, 0.35
+ACROSS, AHEAD = 0, 2  # axes of the level frame
+# Weights of the rows: something may stand before the legs.
+UPPER_SHARE, LOWER_WEIGHT = 0.5, 0.2
 UNKNOWN_MM, FARTHEST_LAYER_MM = 65535, 65000  # chosen: 16 bits hold the farthest layer and half a body behind it
-# An object of at least this share of its usual height reaches into the upper part of its rectangle, this share of the
-# rows: it has more than so many samples there. The object that it hides a part of is farther by at least this distance.
-# Chosen: a hidden chair appears to have 0.6 of its size, rectangles of detectors are hardly larger at the top, and what
-# a person carries is nearer than the trunk by more.
-LEAST_SIZE, UPPER_PART, MOST_ABOVE, LEAST_BEHIND_MM = 0.65, 0.15, 4, 200
-LEFT_OUT_PERCENT = 10  # of the samples at both ends of such an object; chosen: a foot may be as near as what is carried
+LEAST_SIZE = 0.65  # of an object relative to its usual size; chosen: a hidden chair appears to have 0.6 of it
 # Half the depth extents of a person with stretched arms, and of the trunk. Chosen: points farther from the trunk are
 # not part of the person, and a wall close behind must not shift the median.
 BODY_HALF_DEPTH_MM, TRUNK_HALF_DEPTH_MM = 350, 250
 BIN_MM, LAYER_BINS = 50, 5  # of the depth histogram; chosen: a layer is as thick as a trunk
 # The nearest layer with at least this share of the largest layer weight is the person. Chosen: flying pixels have less.
 FIRST_LAYER_SHARE = 0.5
-# Chosen: with fewer samples of the outline, it is not known what surrounds the object. What fills the outline keeps
-# this share of its weight, because a rectangle may be smaller than its object.
-LEAST_OUTLINE, LEAST_INSIDE = 10, 0.3
-OUTLINE_SIGMAS = 2  # chosen: parts of the outline that are no larger than chance count nothing, as of far, noisy people
+# What fills the outline keeps this share of its weight. Chosen: a rectangle may be smaller than its object.
+LEAST_INSIDE = 0.3
 FILLED = 0.4  # minimum share of a side of a rectangle that the background behind an object fills; chosen
 END_PERCENT = 5  # of the samples on a body at its upper and at its lower end; chosen: the head, and the feet
 EDGE_PERCENT = 5  # of the samples ignored at the left and at the right; chosen: arms, flying pixels
-# Half width of the kernel that finds the trunk, the densest part of a body with stretched arms, and number of steps.
-# Chosen: with it, simulated arms and bending move the axis by at most 0.06 m, bending and reaching by 0.11 m, and the
-# positions of cylinders do not depend on which of their pixels have depth.
-TRUNK_HALF_WIDTH_M, TRUNK_STEPS = 0.25, 4
-# Chosen: the axis of a person is at most this far from the middle of the trunk. With less, the errors in the thesis
-# frames grow.
-BESIDE_TRUNK_M = 0.03
-# Legs in stride are densest at one of them. Where the image shows no more of a person, the upper part of the legs, this
-# share of the rows, is below the trunk. Measured in a simulated session (config/error_models/README.md) with 0.15 to
-# 0.4: where x depends on it, its RMSE is 0.04 m; with the densest part 0.09 m.
-HIPS = 0.25
 # Chosen: samples within this distance of the middle of the trunk are above it; a larger share of them in a row is on a
 # head than on raised arms; number of samples of background above it; share of samples of nearer objects, which may hide
 # the head or one side of the trunk.
 HEAD_HALF_WIDTH_M, LEAST_HEAD, LEAST_ABOVE, MOST_IN_FRONT = 0.1, 0.6, 4, 0.05
-# Chosen: a camera with more tilt (sine) sees the floor beside the feet, which is as far away as the body, this high.
-LOOKS_DOWN, FEET_M = np.sin(np.radians(10)), 0.3
-
-_ROW_WEIGHTS = [np.where(np.arange(rows) < UPPER_SHARE * rows, 1, LOWER_WEIGHT)[:, np.newaxis]
-                for rows in range(GRID_ROWS + 1)]  # by the number of rows
-# Number of samples that are surely expected where there are 0, 1, 2, ..., as of a Poisson distribution.
-_SURELY = np.array([max(count - OUTLINE_SIGMAS * math.sqrt(count), 0)
-                    for count in range(2 * GRID_ROWS + GRID_COLUMNS + 1)])
 _EMPTY_BINS = LAYER_BINS // 2 + 1  # of the histogram before the nearest distance
 
 
@@ -80,13 +52,12 @@ class RectSamples(object):
     """Samples of the visible part of a rectangle in the level frame, each an element of flat arrays.
 
     `rays` are the `level_rays`; `surrounded` states whether the left, the upper and the right edge show what surrounds
-    the object, and `least_m` is the least height of an object that reaches the upper part of the rectangle if no nearer
-    one hides it (0: unknown). What is lower than `legs_m` is only the legs of a person. `shape` are the numbers of rows
-    and columns, and `measured` is the number of samples with depth and a viewing ray, masked or not.
+    the object. `shape` are the numbers of rows and columns, and `measured` is the number of samples with depth and a
+    viewing ray, masked or not.
     """
 
-    def __init__(self, depth, rect_px, rays, surrounded, least_m=0.0, legs_m=0.0):
-        self.rect_px, self._rays, self._least_m, self._legs_m = rect_px, rays, least_m, legs_m
+    def __init__(self, depth, rect_px, rays, surrounded):
+        self.rect_px, self._rays = rect_px, rays
         self._rows, self._columns = grid_in(rect_px, depth.shape)
         self._depth_m = _depths(depth.part(self._rows, self._columns), depth.scale_m)
         self.shape = self._depth_m.shape
@@ -97,10 +68,7 @@ class RectSamples(object):
         ahead_mm[is_unknown] = UNKNOWN_MM
         self._ahead_mm = ahead_mm.astype(np.uint16)
         self.measured = ahead_mm.size - np.count_nonzero(is_unknown)
-        left, _top, right, _bottom = rect_px
-        self._weights = (_ROW_WEIGHTS[self.shape[0]] * _column_weights(self._columns.start - left, right - left,
-                                                                       self._columns.step, self.shape[1])).ravel()
-        self._outline = _outline(self.shape, surrounded)
+        self._weights, self._outline = _weights(self.shape), _outline(self.shape, surrounded)
         self._layer = None  # not known, or all samples are masked
 
     def _along(self, axis):
@@ -110,53 +78,17 @@ class RectSamples(object):
             return (across[self._rows, self._columns] * self._depth_m).ravel()
         return ((across[:, self._columns] + down[self._rows]) * self._depth_m).ravel()
 
-    def _layer_in(self, ahead_mm):
-        layer = nearest_dominant_layer(ahead_mm, self._weights, self._outline)
-        return layer and (self._least_m and self._layer_above(ahead_mm, layer) or layer)
-
-    def _layer_above(self, ahead_mm, layer):
-        """The Layer of the object of which a lower one with the given Layer hides a part; None if there is none.
-
-        The lower object, such as a dog or what a person carries, is too small, and does not reach into the upper part
-        of the rectangle. What is above it and fills the middle more than the sides is not the background.
-        """
-        rows, columns = self.shape
-        upper_mm = ahead_mm[:math.ceil(UPPER_PART * rows) * columns]
-        if np.count_nonzero(_around(upper_mm, layer.trunk_mm, TRUNK_HALF_DEPTH_MM)) > MOST_ABOVE:
-            return None
-        numbers = _around(ahead_mm, layer.trunk_mm, TRUNK_HALF_DEPTH_MM).nonzero()[0]
-        if len(numbers) <= MOST_ABOVE:
-            return None
-        above = int(numbers[MOST_ABOVE]) // columns
-        left_out = len(numbers) * LEFT_OUT_PERCENT // 100
-        top_m, bottom_m = self._along(DOWN)[numbers[[left_out, -1 - left_out]]]
-        if bottom_m - top_m > (100 - 2 * LEFT_OUT_PERCENT) / 100 * self._least_m:
-            return None
-        end = above * columns
-        above_mm, weights = ahead_mm[:end], self._weights[:end]
-        behind = nearest_dominant_layer(above_mm, weights, self._outline[self._outline < end])
-        is_masked = 2 * np.count_nonzero(above_mm < UNKNOWN_MM) < end  # as a part of the lower object may be
-        if is_masked or behind.trunk_mm < layer.trunk_mm + LEAST_BEHIND_MM:
-            return None
-        on_behind = _around(ahead_mm, behind.trunk_mm, BODY_HALF_DEPTH_MM)
-        on_behind &= ahead_mm > (layer.trunk_mm + behind.trunk_mm) // 2
-        beside = np.count_nonzero(on_behind[:end].reshape(above, columns)[:, ::max(columns - 1, 1)])
-        share = weights.dot(on_behind[:end]) / weights.sum()
-        if share * 2 * above < beside + math.sqrt(beside + 1):
-            return None
-        return nearest_dominant_layer(np.where(on_behind, ahead_mm, np.uint16(UNKNOWN_MM)), self._weights)
-
     def layer(self):
         """Nearest dominant Layer of the samples that are not masked; None if there are none."""
         if self._layer is None:
-            self._layer = self._layer_in(self._ahead_mm)
+            self._layer = nearest_dominant_layer(self._ahead_mm, self._weights, self._outline)
         return self._layer
 
-    def layer_beside(self, rect_px):
-        """As `layer`, of the samples that are not in another rectangle."""
-        beside_mm = self._ahead_mm.copy()
-        self._part(beside_mm, rect_px)[...] = UNKNOWN_MM
-        return self._layer_in(beside_mm)
+    def share_beside(self, rect_px):
+        """Share of the samples with depth beside another rectangle that are on the body; nan if there are none."""
+        beside, known = (np.count_nonzero(each) - np.count_nonzero(self._part(each, rect_px))
+                         for each in (self.on_body(self.layer()), self._ahead_mm < UNKNOWN_MM))
+        return beside / known if known else 0.5
 
     def mask(self, rect_px, limit_mm):
         """Mask the samples that are in a rectangle and not farther than `limit_mm`. Returns whether this changes the
@@ -192,7 +124,7 @@ class RectSamples(object):
 
     def share(self, on_body):
         """Share of the weight of all samples, with depth or not, that the given samples have."""
-        return self._weights.dot(on_body) / np.add.reduce(self._weights)
+        return self._weights.dot(on_body)
 
     def surround_unknown(self, on_body):
         """Whether the given samples are around something without depth, which may be the object: they fill the outline
@@ -208,28 +140,9 @@ class RectSamples(object):
                          for each in (on_body, self._ahead_mm < UNKNOWN_MM))
         return filled.any() and (filled | ~known).all()
 
-    def edges(self, on_body, height_m, lowest_m=None):
-        """Left and right edge of the body whose samples and height are given, and the middle of its trunk, metres.
-
-        They are those of the samples above `lowest_m`, if there are any. If the median is near the middle of the edges,
-        it stands for the trunk.
-        """
-        if lowest_m is not None:
-            above = on_body & (self._along(DOWN) < lowest_m)
-            on_body = above if above.any() else on_body
-        positions = self._along(ACROSS).compress(on_body)
-        left_m, right_m, trunk_m = edges(positions)
-        if abs(trunk_m - (left_m + right_m) / 2) > BESIDE_TRUNK_M:
-            trunk_m = self._hips(on_body) if height_m < self._legs_m else middle_of_trunk(positions, trunk_m)
-        return left_m, right_m, trunk_m
-
-    def _hips(self, on_body):
-        """Middle between the edges of the upper part of the legs whose samples are given, metres."""
-        rows, columns = self.shape
-        first = int(on_body.argmax()) // columns  # row
-        end = (first + math.ceil(HIPS * (rows - first))) * columns
-        left_m, right_m, _median_m = edges(self._along(ACROSS)[:end].compress(on_body[:end]))
-        return (left_m + right_m) / 2
+    def edges(self, on_body):
+        """Left and right edge of the body whose samples are given, and their median, metres."""
+        return edges(self._along(ACROSS).compress(on_body))
 
     def ends(self, on_body):
         """Mean distances of the upper and of the lower end of the body whose samples are given, metres."""
@@ -311,11 +224,14 @@ def _depths(values, scale_m):
 
 
 @functools.lru_cache(maxsize=512)
-def _column_weights(first, width, step, count):
-    """Weights (count,) of every `step`-th column from the `first` one of a rectangle of a `width` on: a Gaussian about
-    its middle."""
-    across = (first + step * np.arange(count) - width / 2.0) / (width / 4.0)
-    return np.exp(-0.5 * across ** 2)
+def _weights(shape):
+    """Weights of samples, whose sum is 1: those in the upper part count more, and those near the middle, by a Gaussian.
+    """
+    rows, columns = shape
+    across = (np.arange(columns) + 0.5 - columns / 2.0) / (columns / 4.0)
+    down = np.where(np.arange(rows) < UPPER_SHARE * rows, 1, LOWER_WEIGHT)
+    weights = np.outer(down, np.exp(-0.5 * across ** 2)).ravel()
+    return weights / weights.sum()
 
 
 @functools.lru_cache(maxsize=512)
@@ -336,7 +252,7 @@ def nearest_dominant_layer(distances_mm, weights, outline=()):
     """The Layer of the object in a rectangle: the nearest dominant one in the weighted histogram of the distances (n,).
 
     What fills the outline of the rectangle, the distances with the numbers `outline`, surrounds the object: the weight
-    that a layer would surely have if all distances were like those of the outline is subtracted from its own, up to
+    that a layer would have if all distances were like those of the outline is subtracted from its own, up to
     1 - `LEAST_INSIDE` of it. Returns None if no distance is known.
     """
     ordered_mm = distances_mm.copy()
@@ -360,10 +276,10 @@ def _start_of_layer(distances_mm, weights, nearest_mm, farthest_mm, outline):
     numbers //= np.uint16(BIN_MM)
     layers, total = _layer_sums(numbers, weights, bins)
     inside = layers
-    if len(outline) >= LEAST_OUTLINE:
+    if len(outline):
         around, known = _layer_sums(numbers[outline], None, bins)
-        if known >= LEAST_OUTLINE:
-            inside = np.maximum(layers - _SURELY[around] * (total / known), LEAST_INSIDE * layers)
+        if known:
+            inside = np.maximum(layers - around * (total / known), LEAST_INSIDE * layers)
     first = int((inside >= FIRST_LAYER_SHARE * inside[inside.argmax()]).argmax())  # faster than max
     best = first + int(layers[first:first + LAYER_BINS].argmax())
     return nearest_mm + BIN_MM * (best - LAYER_BINS // 2)
@@ -384,33 +300,17 @@ def _median(ranked, nearest, farthest):
     return (ranked[(middle - 1) // 2] + ranked[middle // 2]) // 2
 
 
-def middle_of_trunk(positions, middle_m):
-    """Middle of the densest part of lateral positions (n,), metres, by mean shift (Comaniciu and Meer, 2002) with the
-    weights w^2 - d^2 at distances d, where w is `TRUNK_HALF_WIDTH_M`, from `middle_m` on.
-    """
-    for _step in range(TRUNK_STEPS):
-        from_middle_m = positions - middle_m
-        weights = from_middle_m * from_middle_m
-        np.subtract(TRUNK_HALF_WIDTH_M ** 2, weights, out=weights)
-        np.maximum(weights, 0, out=weights)
-        total = np.add.reduce(weights)  # faster than sum
-        if not total:
-            break
-        middle_m += weights.dot(from_middle_m) / total
-    return middle_m
-
-
 def edges(positions):
     """Lowest and highest value of a uniform distribution with these positions (n,), which are reordered: percentiles,
     extrapolated. Also their median.
     """
     last = len(positions) - 1
     rank, part = divmod(last * EDGE_PERCENT, 100)
-    after = min(rank + 1, last)
-    positions.partition((rank, after, last // 2, last - after, last - rank))
+    after, middle = min(rank + 1, last), last // 2
+    positions.partition((rank, after, middle, last - middle, last - after, last - rank))
     ordered = memoryview(positions)
     low, high = ordered[rank], ordered[last - rank]
     low += (ordered[after] - low) * part / 100.0
     high -= (high - ordered[last - after]) * part / 100.0
     beyond = (high - low) * EDGE_PERCENT / (100.0 - 2 * EDGE_PERCENT)
-    return low - beyond, high + beyond, ordered[last // 2]
+    return low - beyond, high + beyond, (ordered[middle] + ordered[last - middle]) / 2

@@ -8,12 +8,8 @@ CUT_ROWS = 1 / 30.0  # share of the image height at which the lower edges of tru
 SAME_LAYER_M = 0.25  # largest difference of the layers of parts of one body
 CLEARLY_NEARER_M = 0.1
 CLEARLY_LOWER = 0.02  # share of the image height: nearer people stand lower in the image
-LEAST_BESIDE = 0.25  # minimum share of a rectangle beside another one that shows a layer of its own
-CONTAINED = 0.8  # minimum share of a second rectangle of an object in the first one
-# For speed, and more than in a crowd: of more rectangles, those that few others occlude are foremost, too, and a part
-# of the overlaps is ignored; so many layers of rectangles beside each other are determined in one image, and for each
-# of its rectangles.
-MANY, MOST_TIES, TIES_EACH = 50, 32, 1
+CLEARLY_FULLER = 0.2  # difference of the shares of rectangles beside each other that their layers fill
+CONTAINED = 0.8  # minimum share of the smaller of two rectangles of one object in the other one
 
 
 class Overlaps(object):
@@ -36,23 +32,20 @@ class Overlaps(object):
         self._changed = set(usable)  # since the layer was determined
         self._shared_px = _shared_areas(usable, rects_px)  # with each pending rectangle that overlaps another one
         self._nearer = collections.defaultdict(set)  # pending rectangles of nearer objects that overlap it
-        self._layers_m, self._beside_m = {}, {}
-        self._determined_m = {}  # layers beside others, of the samples as they are: {number: {other: layer or None}}
-        self._ties = MOST_TIES + TIES_EACH * len(self.pending)  # that may still be determined
-        self.repeats = set()  # may be of the object of a larger rectangle
+        self._layers_m = {}
+        self.repeats = set()  # may be of the object of another rectangle
 
     def take_foremost(self):
         """Take the pending rectangles that no pending rectangle of a nearer object overlaps. Returns their numbers.
 
-        The nearer of two objects is the one with the nearer layer. A layer that both rectangles show belongs to the one
-        that shows it beside the other one, too. If that does not decide, of two objects of one kind the nearer one is
-        clearly lower in the image, has a clearly nearer layer or is larger, in this order. Of different kinds, it is
+        The nearer of two objects is the one with the nearer layer. If both rectangles show one layer, it belongs to the
+        one that it fills more beside the other one. If that does not decide, of two objects of one kind the nearer one
+        is clearly lower in the image, has a clearly nearer layer or is larger, in this order. Of different kinds, it is
         the one that is not too small for the layer, which may be another object's; otherwise the one that appears
         smaller, as a person on a couch.
         """
         self._update()
-        most = len(self.pending) // MANY
-        foremost = [number for number in self.pending if len(self._nearer[number]) <= most]
+        foremost = [number for number in self.pending if not self._nearer[number]]
         if self.pending and not foremost:  # three or more occlude each other in a circle
             foremost = [max(self.pending,
                             key=lambda number: (self._lowest_px[number], self._areas_px[number], -number))]
@@ -75,7 +68,6 @@ class Overlaps(object):
                 self._remove(number)
             else:
                 self._layers_m[number] = layer.trunk_mm / 1000
-                self._determined_m[number] = {}
         for number in self.pending.intersection(changed):
             self._changed.remove(number)
             for other in self._shared_px[number]:
@@ -84,44 +76,30 @@ class Overlaps(object):
 
     def _compare(self, number, other):
         """Determine which of two overlapping rectangles is of the nearer object, and whether it repeats the other."""
-        farther_m = self._layers_m[number] - self._layers_m[other]
-        self._beside_m.pop((number, other), None)
-        self._beside_m.pop((other, number), None)
-        if abs(farther_m) < SAME_LAYER_M:
-            farther_m = self._determine_beside(number, other) - self._determine_beside(other, number)
-        if not self._is_nearer(other, number, farther_m):
-            number, other, farther_m = other, number, -farther_m
+        if not self._is_nearer(other, number):
+            number, other = other, number
         self._nearer[number].add(other)
         self._nearer[other].discard(number)
-        is_contained = self._shared_px[number][other] >= CONTAINED * self._areas_px[number]
-        if is_contained and abs(farther_m) < SAME_LAYER_M and self._are_alike(number, other):
+        smaller_px = min(self._areas_px[number], self._areas_px[other])
+        is_contained = self._shared_px[number][other] >= CONTAINED * smaller_px
+        is_same = abs(self._layers_m[number] - self._layers_m[other]) < SAME_LAYER_M
+        if is_contained and is_same and self._are_alike(number, other):
             self.repeats.add(number)
-
-    def _determine_beside(self, number, other):
-        """Determine the layer of a rectangle beside another one, metres; its layer if there is none beside it."""
-        is_beside = self._shared_px[number][other] <= (1 - LEAST_BESIDE) * self._areas_px[number]
-        determined_m = self._determined_m[number]
-        if is_beside and other not in determined_m and self._ties:
-            self._ties -= 1
-            layer = self._samples[number].layer_beside(self._rects_px[other])
-            determined_m[other] = layer and layer.trunk_mm / 1000
-        if determined_m.get(other) is not None:
-            self._beside_m[number, other] = determined_m[other]
-        return self._layer_beside(number, other)
-
-    def _layer_beside(self, number, other):
-        return self._beside_m.get((number, other), self._layers_m[number])
 
     def _are_alike(self, number, other):
         group = self._kinds[number].group
         return bool(group) and group == self._kinds[other].group
 
-    def _is_nearer(self, other, number, farther_m):
-        """Whether the other of two objects is nearer; the layer of the first one is `farther_m` farther."""
+    def _is_nearer(self, other, number):
+        """Whether the other of two objects is nearer."""
+        farther_m = self._layers_m[number] - self._layers_m[other]
         if abs(farther_m) >= SAME_LAYER_M:
             return farther_m > 0
         is_larger = (self._areas_px[other], -other) > (self._areas_px[number], -number)
         if self._are_alike(number, other):
+            fuller = self._share_beside(other, number) - self._share_beside(number, other)
+            if abs(fuller) > CLEARLY_FULLER:
+                return fuller > 0
             lower_px = self._lowest_px[other] - self._lowest_px[number]
             if abs(lower_px) > self._clearly_lower_px:
                 return lower_px > 0
@@ -129,13 +107,15 @@ class Overlaps(object):
         is_small, other_is_small = (self._layers_m[each] < self._nearest_m[each] for each in (number, other))
         return not is_larger if is_small == other_is_small else is_small
 
+    def _share_beside(self, number, other):
+        return self._samples[number].share_beside(self._rects_px[other])
+
     def mask_behind(self, number, farthest_mm):
         """Mask what is not farther than `farthest_mm` in the pending rectangles that overlap an estimated one."""
         for other in self.pending.intersection(self._shared_px[number]):
-            layer_m = self._layer_beside(other, number)
-            is_farther = layer_m - self._layer_beside(number, other) >= SAME_LAYER_M and (
-                (other, number) in self._beside_m or not self._are_alike(other, number))
-            own_mm = 1000 * layer_m - BODY_HALF_DEPTH_MM if is_farther else UNKNOWN_MM  # from there on, its own body
+            own_mm = UNKNOWN_MM  # from there on, its own body
+            if self._layers_m[other] - self._layers_m[number] >= SAME_LAYER_M and not self._are_alike(other, number):
+                own_mm = 1000 * self._layers_m[other] - BODY_HALF_DEPTH_MM
             if self._samples[other].mask(self._rects_px[number], min(farthest_mm, own_mm)):
                 self._changed.add(other)
 
@@ -146,7 +126,7 @@ def _shared_areas(usable, rects_px):
     shared_px = collections.defaultdict(dict)
     for rank, (_left, top, right, bottom, number) in enumerate(by_left):
         for other_left, other_top, other_right, other_bottom, other in by_left[rank + 1:]:
-            if other_left >= right or len(shared_px[number]) >= MANY:
+            if other_left >= right:
                 break
             rows_px = min(bottom, other_bottom) - max(top, other_top)
             if rows_px > 0:

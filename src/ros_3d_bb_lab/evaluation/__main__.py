@@ -11,10 +11,10 @@ import sys
 
 from ros_3d_bb.core.atomic_file import check_writable, clean_up_on_sigterm
 
-MODULES = {'accuracy': 'accuracy', 'tracking': 'tracking.benchmark', 'prediction': 'tracking.prediction_benchmark',
-           'scenes': 'scene_benchmark', 'speed': 'speed', 'latency': 'latency.benchmark',
-           'detector': 'detector_benchmark', 'navigation': 'navigation.benchmark', 'gazebo': 'gazebo.benchmark',
-           'video': 'video.benchmark'}
+MODULES = {'ablation': 'ablation', 'accuracy': 'accuracy', 'tracking': 'tracking.benchmark',
+           'prediction': 'tracking.prediction_benchmark', 'scenes': 'scene_benchmark', 'speed': 'speed',
+           'latency': 'latency.benchmark', 'detector': 'detector_benchmark', 'navigation': 'navigation.benchmark',
+           'gazebo': 'gazebo.benchmark', 'video': 'video.benchmark'}
 
 
 def main(words):

@@ -45,9 +45,9 @@ def with_detected_boxes(session, weights):
     return session._replace(frames=tuple(frames))
 
 
-def _estimates_of(session, estimator, model=None):
+def corrected(session, raw_m, model=None):
     """Estimates corrected by an error model, by default one fitted to all other positions for each position."""
-    raw_m, truth_m = _raw_positions(session, estimator), truth_of(session)
+    truth_m = truth_of(session)
     seen = np.isfinite(raw_m[:, 0])
     position_m, covariances = raw_m.copy(), np.full(raw_m.shape + (3,), np.nan)
     if model is not None:
@@ -58,14 +58,20 @@ def _estimates_of(session, estimator, model=None):
     return Estimates(raw_m, position_m, covariances)
 
 
-def _raw_positions(session, estimator):
-    """Estimated position in each frame, (n, 3), NaN if there is no estimate, considering the boxes of other people."""
-    boxes = [frame.estimate(read_depth(frame, session), session.camera, estimator) for frame in session.frames]
+def raw_positions(session, depths, estimator):
+    """Estimated position in each frame, (n, 3), NaN if there is no estimate, considering the boxes of other people,
+    given the DepthImage of each frame."""
+    boxes = [frame.estimate(depth, session.camera, estimator) for frame, depth in zip(session.frames, depths)]
     return np.array([np.full(3, np.nan) if box is None else box.center_m for box in boxes])
 
 
 def truth_of(session):
     return np.array([frame.truth_m[::2] for frame in session.frames])
+
+
+def are_truncated(session):
+    """Whether the image border truncates the box in each frame, (n,)."""
+    return np.array([any(frame.truncated_edges(session.camera)) for frame in session.frames])
 
 
 def scores_of(estimates, truth_m, truncated):
@@ -94,10 +100,10 @@ def _repeatability_m(error_m, truth_m):
 
 def compare(session, estimator, model=None):
     """Compare the estimators on a session. Returns scores and positions as a dictionary, and our `Estimates`."""
-    truth_m = truth_of(session)
-    truncated = np.array([any(frame.truncated_edges(session.camera)) for frame in session.frames])
-    ours = _estimates_of(session, estimator, model)
-    thesis = _thesis_estimates(session)
+    truth_m, truncated = truth_of(session), are_truncated(session)
+    depths = [read_depth(frame, session) for frame in session.frames]
+    ours = corrected(session, raw_positions(session, depths, estimator), model)
+    thesis = _thesis_estimates(session, depths)
     recorded_m = np.array([np.full(3, np.nan) if frame.estimate_m is None or not frame.boxes_px else frame.estimate_m
                            for frame in session.frames])
     recorded = Estimates(recorded_m, recorded_m, None) if np.isfinite(recorded_m[:, 0]).any() else None
@@ -113,12 +119,12 @@ def compare(session, estimator, model=None):
                           for frame, *values in rows]}, ours
 
 
-def _thesis_estimates(session):
+def _thesis_estimates(session, depths):
     """Estimates of the thesis' estimator, uncorrected if there are too few positions."""
+    raw_m = raw_positions(session, depths, estimator_named('median'))
     try:
-        return _estimates_of(session, estimator_named('median'))
+        return corrected(session, raw_m)
     except ValueError:
-        raw_m = _raw_positions(session, estimator_named('median'))
         return Estimates(raw_m, raw_m, None)
 
 

@@ -67,7 +67,7 @@ def run(arguments):
     with tempfile.TemporaryDirectory() as folder:
         data = arguments.data or write_simulated_video(folder)
         video = read_video(data)
-        truth = read_truth(arguments.truth or _truth_path(data), video)
+        truth = read_truth(arguments.truth or truth_path(data), video)
         pose, rate_hz = video.camera_pose(), arguments.rate or truth.rate_hz
         detectors = {DEPTH: depth_detector(video, pose)}
         for name, network in open_networks(arguments.weights, arguments.confidence).items():
@@ -85,7 +85,7 @@ def run(arguments):
     return result
 
 
-def _truth_path(data):
+def truth_path(data):
     """The truth in the folder of a video, or that of the package for a video of this name. Raises ValueError."""
     own = os.path.join(data, 'truth.json')
     marked = os.path.join(MARKED, os.path.basename(os.path.normpath(data)) + '.json')
