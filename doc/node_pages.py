@@ -309,9 +309,9 @@ def _one_line(text):
 
 
 def write_sources(folder):
-    """Replace a folder by the sources of the site: a copy of the checkout with the pages of `pages`."""
+    """Replace a folder by the sources of the site: a copy of the checkout, without large files, with the `pages`."""
     shutil.rmtree(folder, ignore_errors=True)
-    shutil.copytree(ROOT, folder, ignore=shutil.ignore_patterns('.git', '__pycache__'))
+    shutil.copytree(ROOT, folder, ignore=shutil.ignore_patterns('.git', '__pycache__', '*.bag', '*.pt', '*.onnx'))
     os.makedirs(os.path.join(folder, 'doc', 'nodes'), exist_ok=True)
     _write(folder, pages())
 

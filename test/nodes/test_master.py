@@ -73,10 +73,10 @@ def test_the_master_is_killed_and_restarted(tmp_path, monkeypatch):
             rospy.Subscriber(INFO_TOPICS[0], CameraInfo, depth_camera_pub.publish)  # depth is that of colour
             before, pids = stage.recovered('(before the fault)', 60), [pid_of(node) for node in NODES]
             running.enter_context(launched('viewer.launch', 'window:=false', 'label:=A1', 'session:=%s' % tmp_path))
-            rospy.wait_for_service('viewer_node/capture', timeout=20)
+            rospy.wait_for_service('viewer_node/capture', timeout=TIMEOUT_S)
             capture = rospy.ServiceProxy('viewer_node/capture', Trigger, persistent=True)
             wait_until(lambda: stage.tries(TIMEOUT_S) and capture().success, 'a measurement')
-            Client('tracker_node', timeout=20).update_configuration({'marker_history': 3.0})
+            Client('tracker_node', timeout=TIMEOUT_S).update_configuration({'marker_history': 3.0})
             set_label('A2')
             wait_until(lambda: label.from_cache() == 'A2', 'the label that was set')
             diagnostics = running.enter_context(Recorder('/diagnostics', DiagnosticArray))
@@ -97,7 +97,7 @@ def test_the_master_is_killed_and_restarted(tmp_path, monkeypatch):
             with Recorder('/ros_3d_bb/tracks', TrackedObjectArray) as later_subscriber:
                 stage.send()
                 later_subscriber.wait_for(1)
-            rospy.wait_for_service('viewer_node/capture', timeout=20)
+            rospy.wait_for_service('viewer_node/capture', timeout=TIMEOUT_S)
             wait_until(lambda: rospy.get_param('/tracker_node/marker_history', 0) == 3, 'the live parameter')
             wait_until(lambda: failing_once.call_count == 2, 'another registration after an incomplete one')
             assert rospy.get_param('~label') == 'A2'

@@ -23,7 +23,7 @@ def test_playback_tracks_the_person_in_the_map(single_process, session_folder, w
             Recorder('ros_3d_bb/tracks', TrackedObjectArray, False) as tracks, \
             Recorder('visualization_marker_array', MarkerArray, False) as markers, \
             launched('playback.launch', 'bag:=' + path, 'weights:=' + weights, 'rviz:=false', 'exit_at_end:=true',
-                     'delay:=12', 'single_process:=' + single_process) as process:
+                     'delay:=20', 'single_process:=' + single_process) as process:
         process.wait()
     assert len(boxes.messages) > len(frames) / 2
     assert all(message.header.stamp.to_nsec() in frames for message in boxes.messages + tracks.messages)

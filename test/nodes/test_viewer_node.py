@@ -13,7 +13,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb_lab.evaluation.launching import running
 from support.inputs import good_messages
-from support.ros import Recorder, publisher, wait_until
+from support.ros import TIMEOUT_S, Recorder, publisher, wait_until
 from support.screen import press, start_screen
 
 START_NS = 1000 * NS
@@ -45,7 +45,7 @@ def window(monkeypatch, tmp_path):
                   '_label:=by hand']) as process:
         for topic in (COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS[0], BOXES_TOPIC, BOXES3D_TOPIC):
             publisher(topic, type(messages[topic])).publish(messages[topic])
-        rospy.wait_for_service('window/capture', timeout=20)
+        rospy.wait_for_service('window/capture', timeout=TIMEOUT_S)
         yield process, folder
     screen.kill()
 

@@ -1,5 +1,3 @@
-import time
-
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
@@ -98,17 +96,6 @@ def test_a_robot_on_a_slope_300_m_above_the_origin_is_as_fast_as_on_the_level(ti
         standing = track_at([1.5, 0.9, 300.9], [0, 0, 0], moving=False)
         return speed_among(standing, robot_from_tracks=np.linalg.inv(map_from_robot))
     assert speed(**tilt_deg) == pytest.approx(speed(), abs=0.05) and speed() < 1.3
-
-
-def test_people_behind_one_who_limits_the_speed_take_little_time():
-    """Of a robot whose limit without people is as high as it can be set."""
-    tracks = [track_at([3 + number, 0.2, 0.9], [0, 0, 0], number=number) for number in range(20)]
-
-    def cpu_s(count):
-        began_s = time.process_time()
-        speed_among(*tracks[:count][::-1], params=PARAMS._replace(highest_speed=10.0))
-        return time.process_time() - began_s
-    assert min(cpu_s(20) for _again in range(3)) < 6 * min(cpu_s(1) for _again in range(5))
 
 
 def test_limited_velocities_stay_on_their_path():

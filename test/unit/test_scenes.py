@@ -48,6 +48,7 @@ def runs(yolov5):
         simulator, every = simulator_of(name), EVERY if name in THESIS_SCENES else OTHERS_EVERY
         found['depth', name] = run_scene(simulator, depth_detector(simulator), every)
         found['yolov5', name] = run_scene(simulator, yolov5, every)
+        simulator.frame.cache_clear()
     return found
 
 
@@ -81,7 +82,9 @@ def test_recall_and_false_positives_of_detectors(runs, detector, recall, false_r
 @pytest.fixture(scope='module', params=scenario_paths('approach_*'), ids=scene_name)
 def approach(request):
     """A person comes to half a metre for two seconds. All images: ./run bench scenes."""
-    return simulator_of(request.param)
+    simulator = simulator_of(request.param)
+    yield simulator
+    simulator.frame.cache_clear()
 
 
 @pytest.mark.slow
@@ -111,7 +114,7 @@ def test_a_person_too_near_for_the_weight_free_detector_stays_tracked(approach):
 def test_a_robot_that_drives_up_to_a_person_keeps_the_track(seed):
     """The camera of a Jackal. From 1.6 m on, where the image shows legs alone, the detector misses them."""
     simulator = Simulator(scenario_from({
-        'duration': 9.0, 'rate': 10.0, 'seed': seed, 'people': [{'start': [4.0, 0.05], 'facing': 1.5 * seed}],
+        'duration': 7.0, 'rate': 10.0, 'seed': seed, 'people': [{'start': [4.0, 0.05], 'facing': 1.5 * seed}],
         'robot': {'moves': [{'wait': 1.0}, {'to': [2.9, 0.0], 'speed': 0.7}, {'wait': 4.0}]}}))
     exact, none = exact_detector(simulator), detections_without_scores([])
 

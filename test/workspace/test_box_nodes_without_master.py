@@ -13,7 +13,6 @@ from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth, imgmsg
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg,
                                                    boxes3d_to_msg, stamp_of, time_from)
 from ros_3d_bb.core.detection_pace import WINDOW
-from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
@@ -38,7 +37,7 @@ from ros_3d_bb_lab.simulation.simulator import Simulator
 from support.inputs import CAMERA, TARGETS, good_messages, send_image, transforms
 from support.launching import loaded
 from support.masterless import masterless
-from support.ros import depth_message, header_at, wait_until
+from support.ros import depth_message, header_at
 from support.two_cameras import boxes
 
 START_NS = 1000 * NS
@@ -191,16 +190,6 @@ def test_the_service_pauses_and_changed_parameters_apply_to_later_images(camera,
     with pytest.raises(ValueError, match='unicorn'):
         node._set_params(DetectionParams(confidence=1.0, classes=['unicorn']))
     assert len(sent(camera, image[0]).boxes) == 1
-
-
-@pytest.mark.needs('torch')
-def test_the_newest_image_is_processed_and_others_are_skipped(camera, image, monkeypatch):
-    monkeypatch.setattr(detector_output, 'NewestWorker', NewestWorker)
-    node = Yolov5Node()
-    for number in range(60):
-        sent(camera, image[0], START_NS + number)
-    wait_until(lambda: newest(camera) and newest(camera).stamp_ns == START_NS + 59, 'the boxes of the last image')
-    assert camera.publishers[BOXES_TOPIC].count + node._diagnostics.counts['images skipped for a newer one'] == 60
 
 
 def test_a_slow_network_gets_smaller_images_as_the_range_permits_and_then_fewer_at_a_steady_rate():

@@ -64,15 +64,6 @@ def test_obstacles_are_circles_where_people_are_now():
     assert np.trace(covariance) == pytest.approx(0.6) and covariance[2, 2] == pytest.approx(0.3)
 
 
-def test_points_of_obstacles_are_exact_only_in_a_frame_near_the_robot():
-    """They are float32."""
-    tracks = [walker(3, [448265.3, 5411934.25, 0.85], [1, 0, 0])]
-    for tracks, frame_id, error_m in ((tracks, 'map', 0.25), (in_frame(tracks, UTM), 'odom', 0.0)):
-        point = obstacles(tracks, frame_id)[0].polygon.points[0]
-        off_m = np.array([point.x, point.y, point.z]) - tracks[0].position_m
-        assert np.abs(off_m).max() == pytest.approx(error_m, abs=1e-5)
-
-
 def test_mpc_planner_jackal_receives_everyone_with_radius_and_velocity():
     """It skips ID 0, takes the second dimension as the radius, and turns the twist by minus the yaw of the pose
     (tud-amr/mpc_planner, ros1_jackal.cpp, obstacleCallback)."""
@@ -116,9 +107,6 @@ def test_detections_have_box_id_and_covariance():
     assert (box.size.x, box.size.y, box.size.z) == (0.6, 0.6, 1.7) and box.center.orientation.w == 1
     assert (result.id, result.score) == (3, 1.0) and result.pose.pose == box.center
     np.testing.assert_allclose(np.diag(np.reshape(result.pose.covariance, (6, 6)))[:3], [0.01, 0.04, 0.09])
-
-
-UTM = np.linalg.inv(transform_from((448262.3, 5411933.2, 0), (0, 0, 0.6, 0.8)))  # odom_from_map
 
 
 def tilted(roll_deg, pitch_deg, height_m):
