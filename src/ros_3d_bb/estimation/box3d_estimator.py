@@ -23,7 +23,6 @@ LEAST_MEASURED = 0.02  # minimum share of the samples with depth for an estimate
 # person who is too near for it has at most 0.014 in the approach scenes.
 LEAST_SHARE = 0.02
 LEAST_SUPPORT = 0.1  # minimum share of the samples with depth in the layer for an estimate; chosen
-TALL_M, ARMS_ABOVE_M = 1.8, 0.04  # chosen: people who appear taller may raise their arms so far above their heads
 # Share of the difference to the usual width that the image border hides on average: people seen from the side are
 # narrower. Measured by ./run bench accuracy: RMSE 0.038 m, with all of it 0.047 m.
 MISSING_SHARE = 2 / 3
@@ -144,8 +143,8 @@ def estimate_foreground(depth, rects_px, geometry, kinds):
     to form a layer. The position is that of the vertical axis of the object: laterally halfway between the edges of the
     layer, for people at their median, and behind its mean depth by the distance of its class. The ends of
     a person who bends are at their own distances: the head is nearer than the feet, or farther. The height of people
-    does not include raised arms. If the image border truncates the object, it is completed towards the usual size of
-    its class. All of this is done in the level frame.
+    includes raised arms. If the image border truncates the object, it is completed towards the usual size of its
+    class. All of this is done in the level frame.
 
     Samples of a person whose head is above the image are those in a wider rectangle (`_widened`).
 
@@ -274,10 +273,6 @@ def _visible_extents(samples, flat_px, geometry, may_repeat):
     top_m = upper_m * slope_down(middle_px, top_px, geometry)
     bottom_m = lower_m * slope_down(middle_px, bottom_px, geometry)
     left_m, right_m, trunk_m = samples.edges(on_body)
-    if bottom_m - top_m > TALL_M:
-        head_px = top_px + samples.pixels_above_head(on_body, trunk_m, layer_m)
-        head_m = layer_m * slope_down(middle_px, head_px, geometry)
-        top_m = head_m if head_m - top_m > ARMS_ABOVE_M else top_m
     return _Extents(left_m, right_m, trunk_m, top_m, bottom_m, layer_m, support)
 
 

@@ -31,10 +31,6 @@ LEAST_INSIDE = 0.3
 FILLED = 0.4  # minimum share of a side of a rectangle that the background behind an object fills; chosen
 END_PERCENT = 5  # of the samples on a body at its upper and at its lower end; chosen: the head, and the feet
 EDGE_PERCENT = 5  # of the samples ignored at the left and at the right; chosen: arms, flying pixels
-# Chosen: samples within this distance of the middle of the trunk are above it; a larger share of them in a row is on a
-# head than on raised arms; number of samples of background above it; share of samples of nearer objects, which may hide
-# the head or one side of the trunk.
-HEAD_HALF_WIDTH_M, LEAST_HEAD, LEAST_ABOVE, MOST_IN_FRONT = 0.1, 0.6, 4, 0.05
 _EMPTY_BINS = LAYER_BINS // 2 + 1  # of the histogram before the nearest distance
 
 
@@ -149,24 +145,6 @@ class RectSamples(object):
         body_mm = memoryview(self._ahead_mm.compress(on_body))  # for a few numbers, faster than the array
         count = max(len(body_mm) * END_PERCENT // 100, 1)
         return sum(body_mm[:count]) / (1000 * count), sum(body_mm[-count:]) / (1000 * count)
-
-    def pixels_above_head(self, on_body, middle_m, layer_m):
-        """Number of pixels from the upper edge of the rectangle to the head above the middle of the trunk, which raised
-        arms fill in part; 0 if it is not known that background fills the rest, or if a nearer object is in front."""
-        ahead_m = self._along(AHEAD)
-        is_in_front = (ahead_m > 0) & (ahead_m < layer_m - BODY_HALF_DEPTH_MM / 1000)
-        if np.count_nonzero(is_in_front) > MOST_IN_FRONT * is_in_front.size:
-            return 0
-        with np.errstate(divide='ignore', invalid='ignore'):  # without depth
-            across_m = self._along(ACROSS) * (layer_m / ahead_m)
-            is_above_trunk = (np.abs(across_m - middle_m) <= HEAD_HALF_WIDTH_M) & (self._ahead_mm < UNKNOWN_MM)
-        counts, body = (np.count_nonzero(each.reshape(self.shape), axis=1)
-                        for each in (is_above_trunk, is_above_trunk & on_body))
-        is_head = body > LEAST_HEAD * counts.max()
-        row = int(is_head.argmax())
-        if not is_head[row] or (counts - body)[:row].sum() < LEAST_ABOVE:
-            return 0
-        return max(self._rows.start + (row - 0.5) * self._rows.step - self.rect_px[1], 0)
 
     def _part(self, samples, rect_px):
         """View of the part of samples that is in a rectangle."""

@@ -6,7 +6,6 @@ the results of all mechanisms; `=` if all digits are the same.
 import contextlib
 import functools
 import importlib
-import math
 import sys
 import types
 from typing import Any, NamedTuple
@@ -65,7 +64,6 @@ MECHANISMS = tuple(Mechanism(*row) for row in (
     ('unknown depth in the middle', 'estimation.depth_samples', 'RectSamples.surround_unknown', lambda *_: False),
     ('least support', 'estimation.box3d_estimator', 'LEAST_SUPPORT', 0.0),
     ('least number of depths', 'estimation.box3d_estimator', 'LEAST_MEASURED', 0.0),
-    ('raised arms', 'estimation.box3d_estimator', 'TALL_M', math.inf),
     ('level frame', 'estimation.box3d_estimator', 'MAX_TILT_RAD', 0.0),
     ('wider rectangles of near people', 'estimation.box3d_estimator', '_widened',
      lambda samples, *_arguments: samples.rect_px),
