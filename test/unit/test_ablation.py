@@ -1,7 +1,7 @@
 import pytest
 
 from ros_3d_bb.estimation import box3d_estimator, depth_samples
-from ros_3d_bb_lab.evaluation.ablation import MECHANISMS, Mechanism, ablate, check, without
+from ros_3d_bb_lab.evaluation.ablation.benchmark import MECHANISMS, Mechanism, ablate, check, without
 
 
 @pytest.mark.parametrize('mechanism', MECHANISMS, ids=lambda mechanism: mechanism.name)

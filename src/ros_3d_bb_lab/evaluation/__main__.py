@@ -11,7 +11,7 @@ import sys
 
 from ros_3d_bb.core.atomic_file import check_writable, clean_up_on_sigterm
 
-MODULES = {'ablation': 'ablation', 'accuracy': 'accuracy', 'tracking': 'tracking.benchmark',
+MODULES = {'ablation': 'ablation.benchmark', 'accuracy': 'accuracy', 'tracking': 'tracking.benchmark',
            'prediction': 'tracking.prediction_benchmark', 'scenes': 'scene_benchmark', 'speed': 'speed',
            'latency': 'latency.benchmark', 'detector': 'detector_benchmark', 'navigation': 'navigation.benchmark',
            'gazebo': 'gazebo.benchmark', 'video': 'video.benchmark'}

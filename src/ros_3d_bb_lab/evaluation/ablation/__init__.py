@@ -1,0 +1,1 @@
+"""What each mechanism of estimation and tracking is worth."""
