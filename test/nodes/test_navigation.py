@@ -214,7 +214,7 @@ def test_people_are_in_both_costmaps_without_a_gap_and_leave_no_trail(robot):
     """As a soft cost of the social layer, and lethal in the local one where the camera sees them. Tracks are in the
     map, costmaps in odom, and tf is published at 10 Hz."""
     robot.people = two_people
-    robot.advance(1.5, is_driven=False)
+    robot.advance(3.0, is_driven=False)
     robot.social.emptied()
     robot.costmap.emptied()
     robot.advance(6.0, is_driven=False)
