@@ -1,14 +1,17 @@
 """Data association: the gate and the costs of pairs of a track and a measurement, their assignment, and new tracks."""
 import itertools
 import math
+from typing import Any, Callable, Dict, Iterable, List, Optional, Sequence, Set, Tuple
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.appearance import MOST_ALIKE, evidence_of_pairs
-from ros_3d_bb.tracking.kalman_filter import as_outlier, weighted
-from ros_3d_bb.tracking.track import (ARRIVAL_S, LEGS_M, MIN_TRACK_SCORE, SEEN, Track, log_odds_of,
+from ros_3d_bb.tracking.kalman_filter import OutlierModel, as_outlier, weighted
+from ros_3d_bb.tracking.measurement_model import Measurement
+from ros_3d_bb.tracking.out_of_sequence import DetectedImage
+from ros_3d_bb.tracking.track import (ARRIVAL_S, LEGS_M, MIN_TRACK_SCORE, SEEN, Rules, Track, log_odds_of,
                                       log_odds_of_arrival)
 
 HEAD_SIGMAS = 2.0  # standard deviation of the head top relative to that of the height; chosen: the camera tilts
@@ -22,9 +25,13 @@ STARTING_SUPPORT = 0.2  # minimum support of a detection that starts a track: mo
 NEW_NS = 3 * NS // 2  # people pass each other later than that after they were first detected
 SAME_PERSON_M = 0.15  # two people who are both visible cannot be this close to each other
 LOG_TWO_PI = math.log(2 * math.pi)
+Pair = Tuple[int, int]  # numbers of the track and of the measurement
+Costs = Dict[Pair, float]
+Gate = Tuple[float, float, float]  # see `_gate`
 
 
-def associate(tracks, measurements, detection_log_odds, params, outliers):
+def associate(tracks: Sequence[Track], measurements: Sequence[Measurement], detection_log_odds: Sequence[float],
+              params: Any, outliers: OutlierModel) -> List[Tuple[Track, Measurement]]:
     """Assign measurements to tracks, given the log odds that each track is detected, and not missed.
 
     A pair is allowed only if it is more likely than that the measurement is of a new target and the track is missed
@@ -40,7 +47,8 @@ def associate(tracks, measurements, detection_log_odds, params, outliers):
     return [(tracks[row], measurements[column]._replace(is_nearer=(row, column) in nearer)) for row, column in pairs]
 
 
-def detection_log_odds_of(tracks, camera, period_s, detection_probability):
+def detection_log_odds_of(tracks: Sequence[Track], camera: str, period_s: Optional[float],
+                          detection_probability: float) -> List[float]:
     """Log odds that each track is detected in the image of a camera, and not missed, a list; 0, unknown, of tracks that
     are not confirmed, or that the previous image, `period_s` before, does not show, or that have left since.
     """
@@ -50,7 +58,8 @@ def detection_log_odds_of(tracks, camera, period_s, detection_probability):
             for track in tracks]
 
 
-def allowed_costs(tracks, measurements, detection_log_odds, params, outliers):
+def allowed_costs(tracks: Sequence[Track], measurements: Sequence[Measurement], detection_log_odds: Sequence[float],
+                  params: Any, outliers: OutlierModel) -> Tuple[Costs, Set[Pair]]:
     """The costs {(number of the track, number of the measurement): cost} of the allowed pairs, less those of a new
     target and a missed track; and the set of the pairs that fit better if the measurement is nearer than the track by
     the offset of outliers.
@@ -77,7 +86,7 @@ def allowed_costs(tracks, measurements, detection_log_odds, params, outliers):
     return costs, nearer
 
 
-def _gate(measurement, new_target_density, outliers, evidence):
+def _gate(measurement: Measurement, new_target_density: float, outliers: OutlierModel, evidence: float) -> Gate:
     """The cost of a new target plus the most `evidence` of an appearance, and two lengths for a first look: a pair is
     above this cost from the distance `factor` * sqrt(tr P) + `reach` on, where P is the covariance of the position of
     the track.
@@ -94,7 +103,8 @@ def _gate(measurement, new_target_density, outliers, evidence):
     return limit, factor, reach
 
 
-def position_cost(x, y, xx, xy, yy, ray_x, ray_y, outliers):
+def position_cost(x: float, y: float, xx: float, xy: float, yy: float, ray_x: float, ray_y: float,
+                  outliers: OutlierModel) -> float:
     """-log of the density of an innovation (x, y) with the covariance (xx, xy, yy), per m²."""
     inlier, _a_x, _a_y, _determinant = weighted(x, y, xx, xy, yy, outliers.log_inliers)
     x, y, xx, xy, yy = as_outlier(x, y, xx, xy, yy, ray_x, ray_y, outliers)
@@ -103,21 +113,24 @@ def position_cost(x, y, xx, xy, yy, ray_x, ray_y, outliers):
     return LOG_TWO_PI - larger - math.log1p(math.exp(smaller - larger))
 
 
-def position_costs(x, y, xx, xy, yy, ray_x, ray_y, outliers):
+def position_costs(x: Any, y: Any, xx: Any, xy: Any, yy: Any, ray_x: Any, ray_y: Any,
+                   outliers: OutlierModel) -> np.ndarray:
     """As `position_cost`, of arrays."""
     outlier = as_outlier(x, y, xx, xy, yy, ray_x, ray_y, outliers)
     return LOG_TWO_PI - np.logaddexp(weighted(x, y, xx, xy, yy, outliers.log_inliers, np.log)[0],
                                      weighted(*outlier, log_share=outliers.log_outliers, log=np.log)[0])
 
 
-def nearer_cost(x, y, xx, xy, yy, ray_x, ray_y, outliers, log=math.log):
+def nearer_cost(x: Any, y: Any, xx: Any, xy: Any, yy: Any, ray_x: Any, ray_y: Any, outliers: OutlierModel,
+                log: Callable[[Any], Any] = math.log) -> Any:
     """As `position_cost`, of a box that is nearer than the track by the offset of outliers. With `log` = numpy.log, of
     arrays."""
     nearer = as_outlier(x, y, xx, xy, yy, -ray_x, -ray_y, outliers)
     return LOG_TWO_PI - weighted(*nearer, log_share=outliers.log_nearer, log=log)[0]
 
 
-def _likely_pairs(tracks, measurements, gates, outliers):
+def _likely_pairs(tracks: Sequence[Track], measurements: Sequence[Measurement], gates: Sequence[Gate],
+                  outliers: OutlierModel) -> Iterable[Tuple[int, int, float, bool]]:
     """The pairs (row, column, position cost, whether the measurement is nearer) with costs below those of new
     targets.
     """
@@ -137,7 +150,8 @@ def _likely_pairs(tracks, measurements, gates, outliers):
     return pairs
 
 
-def _likely_pairs_of_crowd(tracks, measurements, gates, outliers):
+def _likely_pairs_of_crowd(tracks: Sequence[Track], measurements: Sequence[Measurement], gates: Sequence[Gate],
+                           outliers: OutlierModel) -> Iterable[Tuple[int, int, float, bool]]:
     """As `_likely_pairs`, by arrays."""
     x, y, xx, xy, yy = np.array([track.state for track in tracks]).T[[0, 1, 4, 5, 8]]
     is_recent = np.array([not track.unseen_s for track in tracks])
@@ -155,7 +169,7 @@ def _likely_pairs_of_crowd(tracks, measurements, gates, outliers):
     return zip(*(values[is_likely].tolist() for values in (rows, columns, least, before_costs < costs)))
 
 
-def height_cost(track, measurement, sigma_m):
+def height_cost(track: Track, measurement: Measurement, sigma_m: float) -> float:
     """Association cost of the height difference: its negative log likelihood, 0 for the same height.
 
     The height is unknown if the image border truncates the box, or has truncated all previous boxes of the track, or
@@ -177,7 +191,7 @@ def height_cost(track, measurement, sigma_m):
     return min(cost, top_cost + HIDDEN_LEGS_COST) if abs(height_m - seen_m - higher_m) > LEGS_M else cost
 
 
-def _assigned(costs):
+def _assigned(costs: Costs) -> List[Pair]:
     """The pairs with the minimum total cost, from {(row, column): cost} of the allowed ones: not always as many pairs
     as possible."""
     if not costs:
@@ -193,7 +207,8 @@ def _assigned(costs):
     return [pair for pair in ((rows[row], columns[column]) for row, column in found) if pair in costs]
 
 
-def initiate(unmatched, image, period_s, params, rules, assign_id):
+def initiate(unmatched: Iterable[Measurement], image: DetectedImage, period_s: Optional[float], params: Any,
+             rules: Rules, assign_id: Callable[[int], int]) -> List[Track]:
     """Start tracks from the unmatched measurements of an image, except those that are ignored, or have little support
     or a low score. Returns the new tracks.
 
@@ -211,7 +226,7 @@ def initiate(unmatched, image, period_s, params, rules, assign_id):
     return new
 
 
-def duplicates(tracks, stamp_ns):
+def duplicates(tracks: Sequence[Track], stamp_ns: int) -> Set[int]:
     """The IDs of the tracks that are of the object of an older track: both are confirmed, recently matched and at one
     place, and of one group of classes. Tracks that exist for longer than `NEW_NS` are of different objects, which pass
     each other.
@@ -231,18 +246,18 @@ def duplicates(tracks, stamp_ns):
     return found
 
 
-def _are_same(track, other):
+def _are_same(track: Track, other: Track) -> bool:
     distance_m = math.hypot(track.state.x - other.state.x, track.state.y - other.state.y)
     return distance_m < SAME_PERSON_M and track.kind.group == other.kind.group
 
 
-def plane_distances(positions, others):
+def plane_distances(positions: Any, others: Any) -> np.ndarray:
     """Distances (n, m) in the x-y plane between points (n, 3) and (m, 3), metres."""
     difference = np.asarray(positions, float)[:, None, :2] - np.asarray(others, float)[None, :, :2]
     return np.linalg.norm(difference, axis=2)
 
 
-def assign(costs):
+def assign(costs: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """Rows and columns (k,) of the maximum number of allowed pairs with the minimum total cost; `costs` (n, m) are inf
     for pairs that are not allowed.
     """

@@ -9,20 +9,22 @@ track is misplaced, or the box is.
 The algebra of 2x2 and 4x4 matrices is written out, because numpy takes several times as long for a few numbers.
 """
 import math
-from typing import NamedTuple
+from typing import Any, Callable, NamedTuple, Tuple
 
 NEARER = 0.5  # share of boxes that are nearer by the offset of outliers, relative to that of outliers; chosen
 LEAST_SHARE = 1e-12  # lower bound of the share of a component of the mixture, for its logarithm
 LARGEST_EXPONENT = 700.0  # of math.exp
 
 
-class State(NamedTuple('State', [(name, float) for name in 'x y u v xx xy xu xv yy yu yv uu uv vv'.split()])):
+class State(NamedTuple('State', [('x', float), ('y', float), ('u', float), ('v', float), ('xx', float), ('xy', float),
+                                 ('xu', float), ('xv', float), ('yy', float), ('yu', float), ('yv', float),
+                                 ('uu', float), ('uv', float), ('vv', float)])):
     """State of the filter: mean (x, y, u, v) and the upper triangle of the covariance; (u, v) is the velocity."""
 
     __slots__ = ()
 
     @property
-    def position_m2(self):
+    def position_m2(self) -> float:
         """Variance of the position, the larger one of x and y."""
         return max(self.xx, self.yy)
 
@@ -38,14 +40,14 @@ class OutlierModel(NamedTuple):
     spread_m2: float
 
 
-def outlier_model(params):
+def outlier_model(params: Any) -> OutlierModel:
     """The OutlierModel of `tracker.TrackerParams`."""
     shares = 1 - params.outlier_share, params.outlier_share, NEARER * params.outlier_share
-    log_shares = [math.log(max(share, LEAST_SHARE)) for share in shares]
-    return OutlierModel(*log_shares, offset_m=params.outlier_offset, spread_m2=params.outlier_spread ** 2)
+    log_inliers, log_outliers, log_nearer = (math.log(max(share, LEAST_SHARE)) for share in shares)
+    return OutlierModel(log_inliers, log_outliers, log_nearer, params.outlier_offset, params.outlier_spread ** 2)
 
 
-def predict(state, elapsed_s, density):
+def predict(state: State, elapsed_s: float, density: float) -> State:
     """The State `elapsed_s` ahead, with white-noise acceleration of `density` m²/s³ (Bar-Shalom et al., 2001, 6.2.2).
     """
     x, y, u, v, xx, xy, xu, xv, yy, yu, yv, uu, uv, vv = state
@@ -58,14 +60,15 @@ def predict(state, elapsed_s, density):
                  uu + velocity, uv, vv + velocity)
 
 
-def faster(state, elapsed_s, speed_m2):
+def faster(state: State, elapsed_s: float, speed_m2: float) -> State:
     """The State predicted for `elapsed_s`, with `speed_m2` more variance of the velocity along each axis."""
     shift, spread = elapsed_s * speed_m2, elapsed_s * elapsed_s * speed_m2
     return state._replace(xx=state.xx + spread, xu=state.xu + shift, yy=state.yy + spread, yv=state.yv + shift,
                           uu=state.uu + speed_m2, vv=state.vv + speed_m2)
 
 
-def weighted(x, y, xx, xy, yy, log_share, log=math.log):
+def weighted(x: Any, y: Any, xx: Any, xy: Any, yy: Any, log_share: float,
+             log: Callable[[Any], Any] = math.log) -> Tuple[Any, Any, Any, Any]:
     """Logarithm of the density of an innovation z = (x, y) with the covariance S = (xx, xy, yy), times its share and
     2 pi; S^-1 z; and the determinant of S. With `log` = numpy.log, the numbers may be arrays that broadcast.
     """
@@ -74,7 +77,8 @@ def weighted(x, y, xx, xy, yy, log_share, log=math.log):
     return log_share - (x * a_x + y * a_y + log(determinant)) / 2, a_x, a_y, determinant
 
 
-def as_outlier(x, y, xx, xy, yy, ray_x, ray_y, outliers):
+def as_outlier(x: Any, y: Any, xx: Any, xy: Any, yy: Any, ray_x: Any, ray_y: Any,
+               outliers: OutlierModel) -> Tuple[Any, Any, Any, Any, Any]:
     """Innovation and its covariance (x, y, xx, xy, yy) of an outlier, given those of an inlier and the viewing
     direction; the numbers may be arrays."""
     offset_m, spread_m2 = outliers.offset_m, outliers.spread_m2
@@ -82,7 +86,7 @@ def as_outlier(x, y, xx, xy, yy, ray_x, ray_y, outliers):
             yy + spread_m2 * ray_y * ray_y)
 
 
-def update(state, measurement, outliers):
+def update(state: State, measurement: Any, outliers: OutlierModel) -> State:
     """The State after a Measurement; the mixture of both components is reduced to one Gaussian.
 
     With the columns C = P H^T of the covariance, component i has the gain C S_i^-1, moves the mean by C a_i, where
@@ -112,7 +116,7 @@ def update(state, measurement, outliers):
                  uu - u_x * xu - u_y * yu, uv - u_x * xv - u_y * yv, vv - v_x * xv - v_y * yv)
 
 
-def moved_back(place, ray_x, ray_y, outliers):
+def moved_back(place: Any, ray_x: float, ray_y: float, outliers: OutlierModel) -> Any:
     """A State or Measurement, moved against the direction (ray_x, ray_y) by the offset of outliers."""
     x, y, xx, xy, yy = as_outlier(place.x, place.y, place.xx, place.xy, place.yy, ray_x, ray_y, outliers)
     return place._replace(x=x, y=y, xx=xx, xy=xy, yy=yy)

@@ -10,10 +10,12 @@ image has no such reach, because the person may be occluded, and the box that of
 before, only a box on this side of its predicted place belongs to it, as of a person who stops or turns.
 """
 import math
+from typing import Any, List, Sequence, Tuple
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.kalman_filter import faster
-from ros_3d_bb.tracking.track import HIT_CORRELATION_S
+from ros_3d_bb.tracking.measurement_model import Measurement
+from ros_3d_bb.tracking.track import HIT_CORRELATION_S, Track
 
 # All are chosen; `./run bench tracking --rates` shows the effect of others.
 RUNNING_MPS = 6.0  # of new tracks, whose velocity is unknown: people run no faster indoors
@@ -25,7 +27,9 @@ STOPPED = 0.7  # share of the way to the predicted place that such a person has 
 LONGEST_NS = NS  # between two images; chosen: after longer, anyone may be within reach
 
 
-def match_manoeuvres(tracks, measurements, matches, latest_ns, stamp_ns):
+def match_manoeuvres(tracks: Sequence[Track], measurements: Sequence[Measurement],
+                     matches: Sequence[Tuple[Track, Measurement]], latest_ns: int,
+                     stamp_ns: int) -> List[Tuple[Track, Measurement]]:
     """The pairs (Track, Measurement) outside of the gate that have no other candidates.
 
     `matches` are those of the association, `latest_ns` is the stamp of the latest image of the camera. The velocities
@@ -38,7 +42,7 @@ def match_manoeuvres(tracks, measurements, matches, latest_ns, stamp_ns):
     matched = set(track.id for track, _measurement in matches)
     taken = set(measurement.number for _track, measurement in matches)
 
-    def is_within_reach(track, measurement):
+    def is_within_reach(track: Track, measurement: Measurement) -> bool:
         return _is_within_reach(track, measurement, stamp_ns, track.last_ns >= latest_ns)
 
     pairs = []
@@ -60,7 +64,7 @@ def match_manoeuvres(tracks, measurements, matches, latest_ns, stamp_ns):
     return pairs
 
 
-def _is_within_reach(track, measurement, stamp_ns, may_move):
+def _is_within_reach(track: Track, measurement: Measurement, stamp_ns: int, may_move: bool) -> bool:
     """Whether the object of a track, which stops or turns unless it `may_move` on, may be at a measurement."""
     if track.kind.group != measurement.kind.group:
         return False
@@ -71,6 +75,6 @@ def _is_within_reach(track, measurement, stamp_ns, may_move):
     return is_similar and _distance_m(track.latest, measurement) < speed_mps * elapsed_s + BESIDE_M
 
 
-def _distance_m(place, box):
+def _distance_m(place: Any, box: Any) -> float:
     """Distance of a box from a place in the plane."""
     return math.hypot(box.x - place.x, box.y - place.y)

@@ -7,13 +7,14 @@ little, it follows the errors of the boxes, and they have opposite directions. T
 accordingly. Unlike the size of innovations, their correlation hardly depends on how much people turn.
 """
 import math
-from typing import NamedTuple, Tuple
+from typing import Any, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from ros_3d_bb.core.object_classes import ObjectClass
+from ros_3d_bb.core.detector_model import DetectorModel
+from ros_3d_bb.core.object_classes import ObjectClass, ObjectClasses
 from ros_3d_bb.core.params import Param, parameters
-from ros_3d_bb.tracking.types import NEARER_M, Detection, wrapped
+from ros_3d_bb.tracking.types import NEARER_M, CameraView, Detection, wrapped
 
 FLOOR_M = 0.02  # lower bound of the standard deviation of a centre; chosen: people sway as they walk
 WIDER_M = 0.04  # chosen: people are wider than the usual width, to which the estimator completes truncated boxes
@@ -55,7 +56,7 @@ class Kind(NamedTuple):
 class Kinds(dict):
     """Kind by class name. A class that the table `object_classes.ObjectClasses` does not list is a group of its own."""
 
-    def __init__(self, table):
+    def __init__(self, table: ObjectClasses) -> None:
         super(Kinds, self).__init__()
         self._default = table.default
         for label, known in table.listed.items():
@@ -63,7 +64,7 @@ class Kinds(dict):
             members = tuple(other for other in table.listed if table.group_of(other) == group)
             self[label] = Kind(label, group, members, known)
 
-    def __missing__(self, label):
+    def __missing__(self, label: str) -> Kind:
         return Kind(label, (label,), (label,), self._default)
 
 
@@ -104,7 +105,7 @@ class Measurement(NamedTuple):
     is_nearer: bool = False
 
 
-def correlated_images(elapsed_s, detector, acceleration):
+def correlated_images(elapsed_s: Optional[float], detector: DetectorModel, acceleration: float) -> float:
     """Number of images over which position errors are correlated.
 
     A filter that treats them as independent underestimates its covariance. The lasting part is therefore multiplied by
@@ -118,7 +119,8 @@ def correlated_images(elapsed_s, detector, acceleration):
     return max(1.0, 2 * correlated_s / (elapsed_s or USUAL_PERIOD_S))
 
 
-def measurements_of(detections, view, noise, kinds):
+def measurements_of(detections: Sequence[Detection], view: CameraView, noise: BoxNoise,
+                    kinds: Kinds) -> List[Measurement]:
     """Convert the detections of one image to a list of Measurement, given its BoxNoise and the Kinds.
 
     If a nearer object partly occludes a detection, or the image border leaves only a part of its width, the centre is
@@ -138,9 +140,11 @@ def measurements_of(detections, view, noise, kinds):
     return measurements
 
 
-def _measurement(detection, number, side, kind, direction, noise):
+def _measurement(detection: Detection, number: int, side: int, kind: Kind, direction: Tuple[float, float, float],
+                 noise: BoxNoise) -> Measurement:
     (x, y, z), (ray_x, ray_y) = map(float, detection.position_m), direction[1:]
-    size_m, is_assumed, lasting_m2 = tuple(map(float, detection.size_m)), False, noise.lasting_m ** 2
+    size_m: Any = tuple(map(float, detection.size_m))
+    is_assumed, lasting_m2 = False, noise.lasting_m ** 2
     if detection.covariance_m2 is None:
         xx = yy = zz = noise.unknown_m ** 2
         cross, is_assumed = 0.0, True
@@ -166,7 +170,7 @@ def _measurement(detection, number, side, kind, direction, noise):
         *direction, kind=kind, detection=detection, number=number)
 
 
-def _hidden_sides(detections, view):
+def _hidden_sides(detections: Sequence[Detection], view: CameraView) -> List[int]:
     """Side on which a nearer detection partly occludes each one: 1 left, -1 right, 0 neither or both; a list of int."""
     if len(detections) == 1:
         return [0]
@@ -181,15 +185,14 @@ def _hidden_sides(detections, view):
     return (left.astype(int) - right).tolist()
 
 
-def scaled(measurement, scale):
+def scaled(measurement: Measurement, scale: float) -> Measurement:
     """The measurement with the variances of assumed noise multiplied by `scale`."""
     if not measurement.is_assumed or scale == 1:
         return measurement
-    x, y, z, xx, xy, yy, *others = measurement
-    return Measurement(x, y, z, scale * xx, scale * xy, scale * yy, *others)
+    return measurement._replace(xx=scale * measurement.xx, xy=scale * measurement.xy, yy=scale * measurement.yy)
 
 
-def learned_log_scale(log_scale, matches):
+def learned_log_scale(log_scale: float, matches: Sequence[Tuple[Any, Measurement]]) -> float:
     """The logarithm of the scale of the assumed variance after an image.
 
     In the matches (Track, Measurement), the tracks are predicted to the image, and the measurements have the noise for
@@ -207,7 +210,7 @@ def learned_log_scale(log_scale, matches):
     return min(max(log_scale - GAIN * total, MIN_LOG_SCALE), MAX_LOG_SCALE)
 
 
-def learned_range(range_m, matches):
+def learned_range(range_m: float, matches: Sequence[Tuple[Any, Measurement]]) -> float:
     """Range of the detector after an image with matches (Track, Measurement): `DEFAULT_RANGE_M`, or the filtered mean
     distance of the confirmed tracks that are detected farther away. Beyond it, detectors miss people often."""
     far_m = [measurement.distance_m for track, measurement in matches

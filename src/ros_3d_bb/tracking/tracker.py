@@ -9,23 +9,23 @@ their track ID.
 """
 import math
 import operator
-from typing import NamedTuple, Optional, Sequence
+from typing import Callable, Dict, Iterable, List, NamedTuple, Optional, Sequence, Set, Tuple
 
 from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.appearance import departed_after, meet, returned
+from ros_3d_bb.tracking.appearance import Departed, departed_after, meet, returned
 from ros_3d_bb.tracking.association import NEW_NS, associate, detection_log_odds_of, duplicates, initiate
 from ros_3d_bb.tracking.manoeuvres import match_manoeuvres
-from ros_3d_bb.tracking.measurement_model import (BOX_ERRORS, DEFAULT_RANGE_M, BoxNoise, Kinds, NoiseParams,
-                                                  correlated_images, learned_log_scale, learned_range,
+from ros_3d_bb.tracking.measurement_model import (BOX_ERRORS, DEFAULT_RANGE_M, BoxNoise, Kinds, Measurement,
+                                                  NoiseParams, correlated_images, learned_log_scale, learned_range,
                                                   measurements_of, scaled)
 from ros_3d_bb.tracking.occlusion import CameraState, contradicting_cameras, mark_missed
-from ros_3d_bb.tracking.out_of_sequence import DetectedImage, OutOfSequenceBuffer
+from ros_3d_bb.tracking.out_of_sequence import DetectedImage, Match, OutOfSequenceBuffer
 from ros_3d_bb.tracking.track import (MIN_TRACK_SCORE, PredictionParams, Rules, Track, learned_prediction,
                                       published)
-from ros_3d_bb.tracking.types import VISIBLE, check_steps
+from ros_3d_bb.tracking.types import VISIBLE, CameraView, Detection, TrackedObject, check_steps
 
 KNOWN_NS = 60 * NS  # a camera without images for longer than this, while others send images, counts as new; chosen
 MAX_POSITION_STD_M = 2.4  # tracks whose position is less certain are dropped; chosen
@@ -102,38 +102,39 @@ class Tracker(object):
         If a parameter is invalid; the message names it.
     """
 
-    def __init__(self, params=TrackerParams(), noise=NoiseParams(), prediction=PredictionParams(), last_id=0,
-                 classes=ObjectClasses(), detector=DetectorModel()):
+    def __init__(self, params: TrackerParams = TrackerParams(), noise: NoiseParams = NoiseParams(),
+                 prediction: PredictionParams = PredictionParams(), last_id: int = 0,
+                 classes: ObjectClasses = ObjectClasses(), detector: DetectorModel = DetectorModel()) -> None:
         self._kinds, self._detector = Kinds(classes), detector
         self._start(last_id)
         self.reconfigure(params, noise, prediction)
 
-    def _start(self, last_id, log_noise_scale=0.0):
+    def _start(self, last_id: int, log_noise_scale: float = 0.0) -> None:
         state = _State([], None, {}, log_noise_scale, 0)
         self._buffer = OutOfSequenceBuffer(self._step, state, last_id)
 
-    def reconfigure(self, params, noise, prediction):
+    def reconfigure(self, params: TrackerParams, noise: NoiseParams, prediction: PredictionParams) -> None:
         """Change the parameters and keep the tracks. Raises ValueError without any change if one is invalid."""
         check_steps(prediction.prediction_time, prediction.prediction_step)
         self._params = params, noise, prediction
         self._rules = Rules.of(params, self._kinds)
 
-    def delete_at(self, is_ignored):
+    def delete_at(self, is_ignored: Callable[[Tuple[float, float]], bool]) -> None:
         """Delete the tracks for whose position (x, y) `is_ignored` returns True."""
         self._buffer.replay()
         state = self._buffer.state
         tracks = [track for track in state.tracks if not is_ignored((track.state.x, track.state.y))]
         self._buffer = OutOfSequenceBuffer(self._step, state._replace(tracks=tracks), self._buffer.last_id)
 
-    def reset(self):
+    def reset(self) -> None:
         """Delete all tracks, as after a jump in time. IDs are not reused, and the learned noise is kept."""
         self._start(self._buffer.last_id, self._buffer.state.log_noise_scale)
 
-    def skip(self, stamp_ns, camera=''):
+    def skip(self, stamp_ns: int, camera: str = '') -> None:
         """Skip an image whose detections are unusable: tracks do not age. Never raises, as the image may be late."""
         self._buffer.skip(stamp_ns, camera)
 
-    def update(self, stamp_ns, detections, view):
+    def update(self, stamp_ns: int, detections: Iterable[Detection], view: CameraView) -> List[TrackedObject]:
         """Update the tracks with a list of Detection in the image of a CameraView. Returns the tracks as a list of
         TrackedObject, ordered by ID, at the stamp of the newest image.
 
@@ -144,21 +145,21 @@ class Tracker(object):
         return self._published()
 
     @property
-    def untracked_boxes(self):
+    def untracked_boxes(self) -> int:
         """Number of boxes whose tracks ended unpublished, until the newest image, since the last reset."""
         return self._buffer.state.untracked_boxes
 
     @property
-    def contradicting_cameras(self):
+    def contradicting_cameras(self) -> Optional[Tuple[str, str]]:
         """As of `occlusion.contradicting_cameras`."""
         return contradicting_cameras(self._buffer.state.tracks, self._buffer.state.now_ns)
 
-    def tracks(self):
+    def tracks(self) -> List[TrackedObject]:
         """The published tracks as TrackedObject, ordered by ID, at the stamp of the newest image; with all images."""
         self._buffer.replay()
         return self._published()
 
-    def _published(self):
+    def _published(self) -> List[TrackedObject]:
         state, (params, noise, prediction) = self._buffer.state, self._params
         largest_m2 = params.max_position_std ** 2
         tracks = [track for track in sorted(state.tracks, key=BY_ID) if track.is_confirmed and (
@@ -168,7 +169,8 @@ class Tracker(object):
         camera_m = newest.view.fixed_from_camera[:2, 3] if newest else (0, 0)
         return published(tracks, prediction, params.moving_speed, camera_m)
 
-    def _step(self, before, image, observed_s, assign_id):
+    def _step(self, before: _State, image: DetectedImage, observed_s: float,
+              assign_id: Callable[[int], int]) -> Tuple[_State, List[Match]]:
         """One cycle of the tracker: see `step` of OutOfSequenceBuffer."""
         latest = before.cameras.get(image.view.camera)
         period_s = (image.stamp_ns - latest.stamp_ns) / NS if latest else None
@@ -200,28 +202,30 @@ class Tracker(object):
         state = _State(tracks, image.stamp_ns, cameras, log_noise_scale, untracked_boxes, departed)
         return state, [(track_id,) + match for track_id, match in matched.items()]
 
-    def _predict(self, before, stamp_ns):
+    def _predict(self, before: _State, stamp_ns: int) -> List[Track]:
         """Copies of the tracks, predicted to the image; the next steps change them."""
         elapsed_s = 0.0 if before.now_ns is None else (stamp_ns - before.now_ns) / NS
         acceleration = self._params[0].acceleration
         return [track.predicted(elapsed_s, acceleration) for track in before.tracks]
 
-    def _measure(self, before, image, period_s):
+    def _measure(self, before: _State, image: DetectedImage, period_s: Optional[float]) -> List[Measurement]:
         """The measurements of the image, with the noise for the association: a learned scale that is too small must not
         separate people from their tracks."""
         params, noise, _prediction = self._params
         images = correlated_images(period_s, self._detector, params.acceleration)
-        noise = BoxNoise(noise.noise_unknown, math.exp(max(before.log_noise_scale, 0)), self._detector.lasting_sigma_m,
-                         images)
-        return measurements_of(image.detections, image.view, noise, self._kinds)
+        box_noise = BoxNoise(noise.noise_unknown, math.exp(max(before.log_noise_scale, 0)),
+                             self._detector.lasting_sigma_m, images)
+        return measurements_of(image.detections, image.view, box_noise, self._kinds)
 
-    def _update_matched(self, matches, log_factor, image):
+    def _update_matched(self, matches: Iterable[Tuple[Track, Measurement]], log_factor: float,
+                        image: DetectedImage) -> None:
         """Update the tracks of the matches, with the variance of assumed noise multiplied by exp(`log_factor`)."""
         scale = math.exp(log_factor)
         for track, measurement in matches:
             track.update(scaled(measurement, scale), image.stamp_ns, image.view.camera, self._rules)
 
-    def _cameras_after(self, before, image, matches):
+    def _cameras_after(self, before: _State, image: DetectedImage,
+                       matches: Sequence[Tuple[Track, Measurement]]) -> Dict[str, CameraState]:
         """The CameraState of each camera after an image with matches."""
         latest, range_m = before.cameras.get(image.view.camera), self._detector.max_range_m
         if range_m is None:
@@ -230,9 +234,10 @@ class Tracker(object):
         cameras[image.view.camera] = CameraState(image.stamp_ns, image.view, range_m)
         return cameras
 
-    def _delete(self, tracks, stamp_ns):
+    def _delete(self, tracks: Sequence[Track], stamp_ns: int) -> Tuple[List[Track], List[Track]]:
         """The tracks that are kept (tentative ones for a short time only), and the tracks that end."""
-        max_age_s, kept, deleted, duplicate_ids = self._params[0].max_age, [], [], ()
+        max_age_s, kept, deleted = self._params[0].max_age, [], []  # type: float, List[Track], List[Track]
+        duplicate_ids: Set[int] = set()
         if tracks and stamp_ns - max(tracks, key=FIRST_SEEN).first_ns < NEW_NS:
             duplicate_ids = duplicates(tracks, stamp_ns)
         for track in tracks:
@@ -243,7 +248,8 @@ class Tracker(object):
         return kept, deleted
 
 
-def _recognised(track, tracks, departed):
+def _recognised(track: Track, tracks: List[Track],
+                departed: Tuple[Departed, ...]) -> Tuple[List[Track], Tuple[Departed, ...]]:
     """Give a new track the ID of a person who has returned, if it shows one. Returns the tracks without the former
     track of this person, and the departed without this person."""
     person = returned(track, [other for other in tracks if other.is_confirmed and other is not track], departed)
