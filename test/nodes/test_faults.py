@@ -16,8 +16,8 @@ from support.processes import hanging, killed_and_back, never_reading
 from support.ros import wait_until
 from support.stage import PERIOD_NS, Stage
 
-NODES = '/depth_detector_node', '/bbox3d_node', '/tracker_node', '/planner_bridge_node'
-OUTPUTS = {'/depth_detector_node': ['/yolo_bounding_box', '/yolo_result_out', '/rosout'],
+NODES = '/detector_node', '/bbox3d_node', '/tracker_node', '/planner_bridge_node'
+OUTPUTS = {'/detector_node': ['/yolo_bounding_box', '/yolo_result_out', '/rosout'],
            '/bbox3d_node': ['/ros_3d_bb/bb_3d', '/ros_3d_bb/color', '/ros_3d_bb/depth'],
            '/tracker_node': ['/ros_3d_bb/tracks', '/visualization_marker_array', '/diagnostics'],
            '/planner_bridge_node': ['/planner_bridge_node/points']}

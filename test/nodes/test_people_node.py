@@ -17,9 +17,9 @@ from std_msgs.msg import String
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
+from ros_3d_bb.detection.detector import DetectorParams
 from ros_3d_bb.nodes.common.reconfigure_server import live_in
 from ros_3d_bb.nodes.common.subscribers import subscribe
-from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams
 from ros_3d_bb.visualization.markers import MarkerParams
@@ -27,7 +27,7 @@ from support.compressed import compressed
 from support.ros import TIMEOUT_S, Recorder, depth_message, publisher, wait_until
 
 LIVE = {'bbox3d_node': live_in([Bbox3dParams]),
-        'depth_detector_node': live_in([DepthDetectorParams, DepthPeopleParams]),
+        'detector_node': live_in([DetectorParams, DepthPeopleParams]),
         'tracker_node': live_in((TrackerNodeParams, MarkerParams) + TRACKING_PARAMS)}
 NODES = sorted(LIVE)
 
@@ -98,7 +98,7 @@ def test_live_parameters_are_offered_and_each_offered_value_is_accepted(clients,
      'parameter ~outlier_share is 1.5'),
     ('tracker_node', {'target_frame': 'odom'}, 'parameter ~target_frame is read only at startup'),
     ('tracker_node', {'prediction_step': 1e-6}, 'prediction_step is 1e-06'),
-    ('depth_detector_node', {'floor_height': float('nan'), 'min_depth': 1.0}, 'parameter ~floor_height is nan')])
+    ('detector_node', {'floor_height': float('nan'), 'min_depth': 1.0}, 'parameter ~floor_height is nan')])
 def test_a_request_with_an_invalid_value_is_rejected_as_a_whole(clients, wait_for_line, node, change, words):
     before = current(clients[node])
     response = rospy.ServiceProxy('/%s/set_parameters' % node, Reconfigure)(encode_config(change)).config

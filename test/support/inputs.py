@@ -1,4 +1,4 @@
-"""All nodes that receive messages, and valid messages for them: a person at 2 m."""
+"""All nodes that receive messages, by name and detector, and valid messages for them: a person at 2 m."""
 import copy
 from typing import Callable, NamedTuple
 from unittest import mock
@@ -19,14 +19,13 @@ from ros_3d_bb.detection.yolov5.predictions import Backend
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.camera_pose_node import CameraPoseNode
-from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
+from ros_3d_bb.nodes.detector_node import DetectorNode
 from ros_3d_bb.nodes.follow_node import FollowNode
 from ros_3d_bb.nodes.people_removal_node import PeopleRemovalNode
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeNode
 from ros_3d_bb.nodes.speed_limit_node import SpeedLimitNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.nodes.viewer_node import ViewerNode
-from ros_3d_bb.nodes.yolov5_node import Yolov5Node
 from support.masterless import on_the_wire
 from support.ros import person
 
@@ -44,7 +43,7 @@ class Blind(Backend):
 
 def _yolov5():
     with mock.patch('ros_3d_bb.detection.yolov5.backends.open_runtime', lambda *_given: Blind()):
-        return Yolov5Node()
+        return DetectorNode()
 
 
 class Target(NamedTuple):
@@ -58,8 +57,9 @@ class Target(NamedTuple):
 TARGETS = {
     'bbox3d_node': Target(Bbox3dNode, {}, BOXES3D_TOPIC),
     'tracker_node': Target(TrackerNode, {'tf_timeout': 0.0}, TRACKS_TOPIC),
-    'yolov5_node': Target(_yolov5, {'weights': 'blind.pt', 'image_size': 64}, BOXES_TOPIC),
-    'depth_detector_node': Target(DepthDetectorNode, {}, BOXES_TOPIC),
+    'detector_node': Target(DetectorNode, {'detector': 'depth'}, BOXES_TOPIC),
+    'detector_node yolov5': Target(
+        _yolov5, {'detector': 'yolov5', 'weights': 'blind.pt', 'image_size': 64}, BOXES_TOPIC),
     'camera_pose_node': Target(CameraPoseNode, {}, ''),
     'people_removal_node': Target(PeopleRemovalNode, {'inputs': 'scan, points, depth', 'tf_timeout': 0.0},
                                   '~scan_static'),

@@ -14,7 +14,7 @@ from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_sessi
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb_lab.evaluation.defaults import scenario_path
-from ros_3d_bb_lab.evaluation.scene_benchmark import depth_detector, track_frame
+from ros_3d_bb_lab.evaluation.scene_benchmark import detector_in, track_frame
 from ros_3d_bb_lab.simulation.scenario import read_scenario, scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
 
@@ -127,7 +127,7 @@ def test_the_box_of_a_person_with_hidden_legs_extends_to_the_floor(number):
     camera_from_map = np.linalg.inv(frame.poses.map_from_camera)
     person, = [person for person in frame.people if person.id == 4]
     feet_m = transform_points(camera_from_map, np.append(person.position_m[:2], 0))
-    boxes = depth_detector(simulator)(frame).boxes
+    boxes = detector_in(simulator, 'depth')(frame).boxes
     overlaps = iou(person.box_px, boxes)
     assert overlaps.max() > 0.6
     assert boxes[overlaps.argmax(), 3] == pytest.approx(simulator.camera.project(feet_m[None])[0, 1], abs=3)
@@ -167,7 +167,7 @@ def test_the_last_floor_is_used_if_none_is_visible():
 @pytest.mark.slow
 def test_a_person_who_crouches_stays_detected():
     simulator = Simulator(read_scenario(scenario_path('following_robot')))
-    detect = depth_detector(simulator)
+    detect = detector_in(simulator, 'depth')
     for number in range(42, 58, 3):  # crouches from 43 to 49
         frame = simulator.frame(number)
         x_m, _y_m, z_m = transform_points(np.linalg.inv(frame.poses.map_from_camera), (5.0, -2.2, 0.6))
@@ -180,7 +180,7 @@ def test_a_person_whom_someone_passes_stays_detected():
     simulator = Simulator(scenario_from({'duration': 3.0, 'rate': 10.0, 'seed': 3, 'people': [
         {'start': [3.6, 0.0], 'facing': 3.1, 'moves': [{'wait': 10.0}]},
         {'start': [2.4, 1.2], 'moves': [{'wait': 0.5}, {'to': [2.4, -1.2], 'speed': 0.8}]}]}))
-    detect, least_visible = depth_detector(simulator), 1.0
+    detect, least_visible = detector_in(simulator, 'depth'), 1.0
     for number in range(10, simulator.frame_count):
         frame = simulator.frame(number)
         standing = frame.people[0]
@@ -193,7 +193,7 @@ def test_a_person_whom_someone_passes_stays_detected():
 def test_a_person_half_a_metre_from_a_camera_stays_at_the_place():
     """Only a part at the border of the image is far enough for the depth camera."""
     simulator = Simulator(read_scenario(scenario_path('approach_high_mount')))
-    detect, tracker = depth_detector(simulator), Tracker()
+    detect, tracker = detector_in(simulator, 'depth'), Tracker()
     for number in range(80, 160, 2):
         frame = simulator.frame(number)
         tracks = track_frame(tracker, frame, detect(frame), int(frame.time_s * NS), simulator.camera, None)
@@ -208,7 +208,7 @@ def test_a_robot_that_drives_up_to_a_person_does_not_lose_the_legs():
     simulator = Simulator(scenario_from({
         'duration': 12.0, 'rate': 10.0, 'seed': 1, 'people': [{'start': [2.8, 0.1], 'facing': 3.1, 'height': 1.75}],
         'robot': {'moves': [{'wait': 0.5}, {'to': [1.4, 0.0], 'speed': 0.5}]}}))
-    detect = depth_detector(simulator)
+    detect = detector_in(simulator, 'depth')
     assert all([len(detect(simulator.frame(number)).boxes) == 1 for number in range(simulator.frame_count)])
 
 
@@ -238,7 +238,7 @@ def test_the_walls_of_an_empty_corridor_are_not_detected():
     simulator = Simulator(scenario_from({
         'rate': 5.0, 'room': {'bounds': [-1.0, 12.0, -0.8, 0.8], 'height': 2.8},
         'robot': {'pose': [0.0, 0.4, 0.0], 'mount': [0.0, 0.0, 1.9], 'pitch': 0.33}}))
-    detect = depth_detector(simulator)
+    detect = detector_in(simulator, 'depth')
     assert [len(detect(simulator.frame(number)).boxes) for number in range(5)] == [0] * 5
 
 

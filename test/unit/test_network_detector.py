@@ -73,7 +73,7 @@ def test_predictions_are_filtered_by_class_and_confidence():
 
 
 def test_without_a_node_the_input_is_the_largest_on_each_machine():
-    """Bags and benchmarks are reproducible: only yolov5_node adapts the size."""
+    """Bags and benchmarks are reproducible: only detector_node adapts the size."""
     runtime = FixedRuntime()
     NetworkDetector(runtime).detect(np.zeros((480, 640, 3), np.uint8))
     assert DetectionParams().image_size == 0 and runtime.inputs[0].shape == (480, 640, 3)

@@ -12,7 +12,7 @@ from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb_lab.evaluation.clear_mot import score
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_paths, scene_name
-from ros_3d_bb_lab.evaluation.scene_benchmark import (RANGE_M, depth_detector, detections_without_scores,
+from ros_3d_bb_lab.evaluation.scene_benchmark import (RANGE_M, detector_in, detections_without_scores,
                                                       exact_detector, result_of, run_scene, score_detections,
                                                       yolov5_detector)
 from ros_3d_bb_lab.simulation.scenario import read_scenario, scenario_from
@@ -46,7 +46,7 @@ def runs(yolov5):
     found = {}
     for name in SCENES:
         simulator, every = simulator_of(name), EVERY if name in THESIS_SCENES else OTHERS_EVERY
-        found['depth', name] = run_scene(simulator, depth_detector(simulator), every)
+        found['depth', name] = run_scene(simulator, detector_in(simulator, 'depth'), every)
         found['yolov5', name] = run_scene(simulator, yolov5, every)
         simulator.frame.cache_clear()
     return found
@@ -100,7 +100,7 @@ def test_a_person_approaching_to_half_a_metre_is_one_visible_track(approach):
 @pytest.mark.slow
 def test_a_person_too_near_for_the_weight_free_detector_stays_tracked(approach):
     ids = set()
-    for step in run_scene(approach, depth_detector(approach), 3):
+    for step in run_scene(approach, detector_in(approach, 'depth'), 3):
         (person,), camera_m = step.frame.people, step.frame.poses.map_from_camera[:3, 3]
         if plane_distances([person.position_m], [camera_m]) < 0.6:
             track, = step.moment.tracks

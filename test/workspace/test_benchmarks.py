@@ -41,7 +41,7 @@ def test_modes_differ_in_what_move_base_knows_of_people(mode):
 
 def test_a_detector_replaces_the_true_boxes_and_a_trial_runs_with_teb():
     parameters, nodes = loaded('navigation_benchmark.launch', 'detector:=depth', 'local_planner:=teb', *ARGUMENTS)
-    assert not parameters['/simulator_node/boxes'] and 'depth_detector_node' in nodes
+    assert not parameters['/simulator_node/boxes'] and 'detector_node' in nodes
     assert parameters['/move_base/base_local_planner'] == 'teb_local_planner/TebLocalPlannerROS'
 
 

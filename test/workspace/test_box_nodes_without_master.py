@@ -17,15 +17,15 @@ from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
+from ros_3d_bb.detection.detector import DetectorParams
 from ros_3d_bb.detection.network_detector import DetectionParams
+from ros_3d_bb.detection.yolov5.backends import RuntimeParams
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.common import detector_output
-from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
+from ros_3d_bb.nodes.detector_node import DetectorNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.nodes.viewer_node import ViewerNode
-from ros_3d_bb.nodes.yolov5_node import Yolov5Node
-from ros_3d_bb.pipeline.detection_stage import DepthDetectorParams
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
@@ -104,9 +104,9 @@ def answer(frame_id='camera_color_optical_frame', changed=DepthPeopleParams(), *
     """The boxes and the annotated image of one image, the counts of the node, and the true boxes."""
     simulator = Simulator(scenario_from(dict({'rate': 10.0, 'people': PEOPLE}, **scenario)))
     frame = simulator.frame(0)
-    with masterless() as connections:
-        node = DepthDetectorNode()
-        node._reconfigure(DepthDetectorParams(), changed)
+    with masterless({'detector': 'depth'}) as connections:
+        node = DetectorNode()
+        node._reconfigure(DetectorParams(), changed)
         for topic, message in simulated_messages(simulator, frame, START_NS):
             topic = '/tf' if topic == 'tf' else topic
             if topic != '/tf':
@@ -143,7 +143,7 @@ def test_nothing_is_published_while_no_floor_is_known():
 @pytest.fixture
 def camera(weights):
     """The connections of the node, whose workers work at once."""
-    parameters, _nodes = loaded('yolov5.launch', 'weights:=' + weights)
+    parameters, _nodes = loaded('detector.launch', 'weights:=' + weights)
     with masterless({name.rpartition('/')[2]: value for name, value in parameters.items()}) as connections:
         yield connections
 
@@ -168,7 +168,7 @@ def sent(camera, image, stamp_ns=START_NS):
 
 @pytest.mark.needs('torch')
 def test_the_person_is_detected_and_drawn_at_the_stamp_of_the_image(camera, image):
-    Yolov5Node()
+    DetectorNode()
     pixels, box = image
     boxes, drawn = sent(camera, pixels), camera.publishers['yolo_result_out'].newest
     assert boxes.stamp_ns == START_NS == stamp_of(drawn) and boxes.frame_id == 'camera_color_optical_frame'
@@ -181,14 +181,14 @@ def test_the_person_is_detected_and_drawn_at_the_stamp_of_the_image(camera, imag
 @pytest.mark.needs('torch')
 def test_the_service_pauses_and_changed_parameters_apply_to_later_images(camera, image):
     """An empty array means that no people were detected."""
-    node = Yolov5Node()
+    node = DetectorNode()
     assert 'paused' in node._worker._on_request(SetBoolRequest(False)).message
     assert sent(camera, image[0]) is None and node._worker._on_request(SetBoolRequest(True)).success
     for changes, count in (({'confidence': 1.0}, 0), ({}, 1), ({'image_size': 320}, 1), ({'image_size': 0}, 1)):
-        node._set_params(DetectionParams(**changes))
+        node._reconfigure(node.params, DetectionParams(**changes), RuntimeParams())
         assert len(sent(camera, image[0]).boxes) == count
     with pytest.raises(ValueError, match='unicorn'):
-        node._set_params(DetectionParams(confidence=1.0, classes=['unicorn']))
+        node._reconfigure(node.params, DetectionParams(confidence=1.0, classes=['unicorn']), RuntimeParams())
     assert len(sent(camera, image[0]).boxes) == 1
 
 
@@ -196,7 +196,7 @@ def test_a_slow_network_gets_smaller_images_as_the_range_permits_and_then_fewer_
     """All detections take 50 ms, at 30 Hz."""
     clock = mock.Mock(monotonic=mock.Mock(side_effect=np.arange(0, 1000, 0.05)))
     with masterless({'weights': 'blind.pt'}) as connections, mock.patch.object(detector_output, 'time', clock):
-        node, sizes, stamps_ns = TARGETS['yolov5_node'].make(), [], []
+        node, sizes, stamps_ns = TARGETS['detector_node yolov5'].make(), [], []
         for number in range(4 * WINDOW):
             messages = good_messages(START_NS + number * NS // 30)
             for topic in (INFO_TOPICS[0], COLOR_TOPIC):

@@ -20,9 +20,10 @@ from ros_3d_bb.conversions.image_msgs import fill_image
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, time_from, tracks_from_msg, transform_from_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import Detections
+from ros_3d_bb.detection.detector import DetectorParams
 from ros_3d_bb.nodes.camera_pose_node import CameraPoseNode
 from ros_3d_bb.nodes.doctor import bag_findings
-from ros_3d_bb.pipeline.detection_stage import CameraRotation, Yolov5NodeParams, detect_in_color
+from ros_3d_bb.pipeline.detection_stage import CameraRotation, detect_in_color
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
 from support.bags import changed_bag, messages_in
@@ -234,7 +235,7 @@ def test_yolov5_sees_upright_images_once_tf_is_known(turns):
     message = fill_image(Image(header=Header(stamp=time_from(NS), frame_id='optical')), received, 'rgb8')
     camera_from_floor = np.linalg.inv(mounted_camera(1.0, 0.2, turns))
     transforms = mock.Mock(lookup=lambda *_arguments: camera_from_floor)
-    rotation = CameraRotation(Yolov5NodeParams(), transforms, lambda: known.append(True))
+    rotation = CameraRotation(DetectorParams(), transforms, lambda: known.append(True))
     assert rotation.turns('optical') == turns and rotation.turns('optical') == turns and known == [True]
     found = Detections(np.array([[1.0, 2.0, 4.0, 9.0]]), np.array([0.9]), np.array([0]))
     detector = mock.Mock(detect=mock.Mock(return_value=found))
@@ -263,8 +264,8 @@ def test_launch_arguments_publish_the_pose_of_a_camera_alone(degrees):
     assert (parent, child, camera) == ('map', child_parent, 'optical')
     turns = 0 if degrees == 'auto' else int(degrees) // 90
     np.testing.assert_allclose(mount.dot(optical), mounted_camera(1.2, 0.1, turns, 0.2), atol=1e-6)
-    assert parameters['/bbox3d_node/floor_frame'] == parameters['/depth_detector_node/floor_frame'] == 'map'
-    assert parameters['/depth_detector_node/floor_height'] == 0
+    assert parameters['/bbox3d_node/floor_frame'] == parameters['/detector_node/floor_frame'] == 'map'
+    assert parameters['/detector_node/floor_height'] == 0
     assert parameters['/bbox3d_node/image_rotation'] == degrees
 
 
@@ -282,7 +283,6 @@ def test_launch_arguments_publish_the_pose_of_a_camera_alone(degrees):
     ('measure.launch', ['session:=/s', 'camera_height:=1', 'camera_tilt:=20'], ['camera_tilt', '20', 'radians']),
     ('jackal.launch', ['driver:=none', 'mount:=0.1 0 0,4 0 0 0'], ['mount', '0,4', 'six numbers']),
     ('jackal.launch', ['driver:=none', 'mount:=0.1 0 0.4'], ['mount', '0.1 0 0.4', 'six numbers']),
-    ('pipeline.launch', ['cameras:=front,rear', 'detector:=yolo5'], ['detector', 'yolo5']),
     ('jackal.launch', ['driver:=realsense'], ['driver', 'realsense2_camera', 'pyrealsense2']),
     ('realsense.launch', ['file:=/a.bag', 'driver:=realsense2_camera'], ['file', 'driver', 'pyrealsense2'])])
 def test_unusable_launch_arguments_are_refused(launch_file, given, named):

@@ -11,7 +11,7 @@ from ros_3d_bb.planning.following import FollowParams, Follower
 from ros_3d_bb.planning.safe_speed import SafeSpeedParams
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL
-from ros_3d_bb_lab.evaluation.scene_benchmark import depth_detector, track_frame
+from ros_3d_bb_lab.evaluation.scene_benchmark import detector_in, track_frame
 from ros_3d_bb_lab.simulation.driven_world import DrivenWorld
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import Simulator
@@ -27,7 +27,7 @@ def followed(scenario, seconds):
     Returns the number of the followed person (from 1, 0 without one) in each image, and the collisions.
     """
     simulator = Simulator(scenario)
-    world, detect, tracker = DrivenWorld(simulator), depth_detector(simulator), Tracker()
+    world, detect, tracker = DrivenWorld(simulator), detector_in(simulator, 'depth'), Tracker()
     error_model, follower = read_error_model(SIMULATED_ERROR_MODEL), Follower(FollowParams(), SafeSpeedParams())
     waiting, persons, newest = [], [], None
     for time_s, number in itertools.takewhile(lambda step: step[0] <= seconds, simulator.steps()):

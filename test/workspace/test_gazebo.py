@@ -102,7 +102,7 @@ def test_the_launch_file_starts_gazebo_the_robot_and_the_pipeline(tmp_path):
     assert given == {'gui': 'false', 'x': '0.0', 'y': '-1.5', 'yaw': '0.3', 'z': '0.1', 'joystick': 'false',
                      'paused': 'false'}
     assert 'camera_color_optical_frame' in parameters['/robot_description']
-    assert parameters['/yolov5_node/weights'] == '/some/yolov5n.pt'
+    assert parameters['/detector_node/weights'] == '/some/yolov5n.pt'
     assert parameters['/tracker_node/target_frame'] == 'odom'
 
 

@@ -32,8 +32,7 @@ ROBOT_NODES = ['camera_mount', 'people_node', 'planner_bridge_node', 'realsense_
 CASES = [
     (MEASURE, {'nodes': ['people_node', 'viewer_node'], '/viewer_node/session': '/a session',
                '/viewer_node/window': True, '/tracker_node/target_frame': 'map',
-               'viewer_node:detector/enable': 'yolov5_node/enable'}),
-    (MEASURE + 'detector:=depth', {'viewer_node:detector/enable': 'depth_detector_node/enable'}),
+               'viewer_node:detector/enable': 'detector_node/enable'}),
     (MEASURE + 'camera:=true driver:=pyrealsense2', {'nodes': ['people_node', 'realsense_node', 'viewer_node']}),
     (MEASURE + 'camera_image:=a/color bb_topic:=a/boxes', {
         'viewer_node:camera/color/image_raw': 'a/color', 'people_node:camera/color/image_raw': 'a/color',
@@ -80,22 +79,22 @@ CASES = [
         '/planner_bridge_node/outputs': 'costmap, people',
         'global layers': ['static_layer', 'obstacle_layer', 'people_layer', 'proxemic_layer', 'inflation_layer']}),
     ('pipeline.launch detector:=depth depth:=raw', {
-        '/depth_detector_node/depth': 'raw', '/bbox3d_node/depth': 'raw', '/tracker_node/depth': 'raw',
+        '/detector_node/depth': 'raw', '/bbox3d_node/depth': 'raw', '/tracker_node/depth': 'raw',
         'people_node:camera/depth/image_rect_raw': 'camera/depth/image_rect_raw'}),
     ('pipeline.launch detector:=depth cameras:=front', {
-        '/front/depth_detector_node/depth': 'aligned', '/front/bbox3d_node/depth': 'aligned',
+        '/front/detector_node/depth': 'aligned', '/front/bbox3d_node/depth': 'aligned',
         '/tracker_node/cameras': 'front', '/people_node/detector': None}),
     ('pipeline.launch detector:=depth depth:=raw rviz:=true cameras:="front, rear"', {
-        '/front/depth_detector_node/depth': 'raw', '/rear/bbox3d_node/depth': 'raw', '/tracker_node/depth': 'raw',
+        '/front/detector_node/depth': 'raw', '/rear/bbox3d_node/depth': 'raw', '/tracker_node/depth': 'raw',
         '/tracker_node/cameras': 'front, rear', 'rviz:yolo_result_out': 'front/yolo_result_out',
         'bbox3d_node:camera/depth/image_rect_raw': 'depth/image_rect_raw',  # in the namespace of its camera
         'tracker_node:camera/depth/image_rect_raw': 'camera/depth/image_rect_raw'}),
     ('pipeline.launch weights:=/some.pt floor_frame:=none', {
-        '/bbox3d_node/floor_frame': '', '/yolov5_node/floor_frame': ''}),
+        '/bbox3d_node/floor_frame': '', '/detector_node/floor_frame': ''}),
     ('playback.launch bag:=/b.bag detector:=depth camera_pose:=floor image_rotation:=90', {
         '/camera_pose_node/frame_world': 'map', '/camera_pose_node/image_rotation': '90',
-        '/bbox3d_node/floor_frame': 'map', '/depth_detector_node/floor_frame': 'map',
-        '/depth_detector_node/floor_height': 0, '/tracker_node/target_frame': 'map'}),
+        '/bbox3d_node/floor_frame': 'map', '/detector_node/floor_frame': 'map',
+        '/detector_node/floor_height': 0, '/tracker_node/target_frame': 'map'}),
     ('simulation.launch rviz:=false error_model:=none', {
         '/bbox3d_node/floor_frame': 'base_link', '/bbox3d_node/error_model': None, '/tracker_node/error_model': None}),
     (ON_ROBOT + 'computer:=192.168.131.20', {
@@ -188,10 +187,10 @@ WITH_DRIVER = [
         '/front/rgb_camera/exposure': 80}),  # in units of the sensor
     ('measure.launch camera:=true detector:=depth session:=/a', {
         '/stub/align_depth': 'true', '/tracker_node/target_frame': 'camera_link',
-        '/depth_detector_node/floor_frame': ''}),
+        '/detector_node/floor_frame': ''}),
     ('jackal.launch weights:=/some/yolov5n.pt fps:=15 planner:=costmap frame_world:=odom error_model:=/model.yaml', {
         '/stub/align_depth': 'true', '/stub/color_fps': '15', '/stub/respawn': 'true',
-        '/yolov5_node/weights': '/some/yolov5n.pt', '/tracker_node/target_frame': 'odom',
+        '/detector_node/weights': '/some/yolov5n.pt', '/tracker_node/target_frame': 'odom',
         '/planner_bridge_node/outputs': 'costmap', '/bbox3d_node/error_model': '/model.yaml',
         '/tracker_node/error_model': '/model.yaml'})]
 
@@ -238,7 +237,7 @@ def test_launch_files_use_the_topics_of_a_recipe(recipe):
     depth_topic = DEPTH_TOPICS[given.get('depth', 'aligned')][0]
     everything = {COLOR_TOPIC: color, INFO_TOPICS[0]: info, depth_topic: depth}
     for node, topics in (('people_node', everything), ('bbox3d_node', everything),
-                         ('yolov5_node', {COLOR_TOPIC: color}),
+                         ('detector_node', {COLOR_TOPIC: color}),
                          ('tracker_node', {INFO_TOPICS[0]: info, depth_topic: depth})):
         remaps = dict(nodes[node].remap_args)
         assert {topic: remaps[topic] for topic in topics} == topics

@@ -1,10 +1,14 @@
 """Nodes and process_bag publish the same messages for the same bag, whose images may be compressed."""
+import json
+from typing import NamedTuple
+
 import genpy
 import numpy as np
 import pytest
 from std_msgs.msg import Header
 
 from ros_3d_bb.bags.bag_pipeline import process_bag
+from ros_3d_bb.bags.process_bag import main
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.images import DepthImage, mounted_camera
 from ros_3d_bb.conversions import image_msgs
@@ -12,17 +16,46 @@ from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, TF_TOPIC
 from ros_3d_bb.conversions.compressed_images import decode
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg
 from ros_3d_bb.core.latest_worker import NewestWorker
+from ros_3d_bb.core.params import Param, parameters
+from ros_3d_bb.detection.boxes import Detections
+from ros_3d_bb.detection.detector import Detector
 from ros_3d_bb.nodes import people_node, tracker_node
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
-from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
+from ros_3d_bb.nodes.detector_node import DetectorNode
 from ros_3d_bb.nodes.people_node import PeopleNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
+from ros_3d_bb.pipeline.detectors import DETECTORS, Row
 from ros_3d_bb.pipeline.people_pipeline import Settings
 from support.bags import changed_bag, messages_in, scene_bag
+from support.code_blocks import blocks_in
 from support.compressed import compressed
 from support.masterless import masterless, published
 from support.ros import wait_until
+
+
+@parameters('Detector middle')
+class MiddleParams(NamedTuple):
+    """Parameters of a detector."""
+
+    width: float = Param(0.5, 'Width of the box, as a share of the image.', live=(0, 1))
+
+
+class Middle(Detector):
+    """A person in the middle of each frame."""
+
+    def detect(self, frame):
+        half = self._own[0].width * frame.camera.width / 2
+        box = [frame.camera.width / 2 - half, 0, frame.camera.width / 2 + half, frame.camera.height]
+        return Detections(np.array([box]), np.ones(1), np.zeros(1, int))
+
+
+def example():
+    """The detector in CONTRIBUTING.md."""
+    block, names = next(block for block in blocks_in('CONTRIBUTING.md') if 'MiddleDetector(' in block.text), {}
+    exec(block.text, names)
+    return names['MiddleDetector']
+
 
 SCENE = {'duration': 1.5, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}]}
 
@@ -45,9 +78,10 @@ def bags(request, tmp_path_factory):
 
 
 @pytest.mark.parametrize('node_class, input_bag, params, topics', [
-    (DepthDetectorNode, 0, {}, ['yolo_bounding_box']), (Bbox3dNode, 1, {}, ['ros_3d_bb/bb_3d']),
+    (DetectorNode, 0, {'detector': 'depth'}, ['yolo_bounding_box']), (Bbox3dNode, 1, {}, ['ros_3d_bb/bb_3d']),
     (TrackerNode, 1, {'tf_timeout': 0.0}, ['ros_3d_bb/tracks', 'visualization_marker_array']),
-    (PeopleNode, 0, {'detector': 'depth'}, ['yolo_bounding_box', 'ros_3d_bb/bb_3d', 'ros_3d_bb/tracks'])])
+    (PeopleNode, 0, {'detector_node': {'detector': 'depth'}}, [
+        'yolo_bounding_box', 'ros_3d_bb/bb_3d', 'ros_3d_bb/tracks'])])
 def test_process_bag_writes_the_messages_that_the_nodes_publish(bags, node_class, input_bag, params, topics):
     found = published(node_class, bags[input_bag], params, topics)
     for topic in topics:
@@ -60,7 +94,7 @@ def test_process_bag_writes_the_messages_that_the_nodes_publish(bags, node_class
 def test_people_node_and_process_bag_decode_each_image_once(bags, tmp_path, monkeypatch):
     decoded = []
     monkeypatch.setattr(image_msgs, 'decode', lambda text, data: decoded.append(text) or decode(text, data))
-    published(PeopleNode, bags[0], {'detector': 'depth'}, [TRACKS_TOPIC])
+    published(PeopleNode, bags[0], {'detector_node': {'detector': 'depth'}}, [TRACKS_TOPIC])
     of_node = sorted(decoded)
     del decoded[:]
     process_bag(bags[0], str(tmp_path / 'out.bag'), Settings(detector='depth', names=NAMES))
@@ -68,12 +102,36 @@ def test_people_node_and_process_bag_decode_each_image_once(bags, tmp_path, monk
     assert sum('compressedDepth' in text for text in decoded) == 15
 
 
+@pytest.mark.parametrize('bags', ['plain'], indirect=True)
+@pytest.mark.parametrize('row, params', [(Row(example()), {}), (Row(Middle, (MiddleParams,), True), {'width': 0.2})])
+def test_a_detector_in_the_registry_runs_in_bags_and_nodes(bags, tmp_path, monkeypatch, row, params):
+    monkeypatch.setitem(DETECTORS, 'middle', row)
+    (tmp_path / 'params.yaml').write_text(json.dumps(params))
+    with pytest.raises(SystemExit) as ended:
+        main([bags[0], str(tmp_path / 'out.bag'), '--detector', 'middle', '--detector-params',
+              str(tmp_path / 'params.yaml')])
+    assert not ended.value.code
+    topics = [BOXES_TOPIC, BOXES3D_TOPIC, TRACKS_TOPIC]
+    found = published(PeopleNode, bags[0], {'detector_node': dict(params, detector='middle')}, topics)
+    expected = messages_in(tmp_path / 'out.bag')
+    assert len(found[BOXES_TOPIC]) == 15 and found[BOXES_TOPIC][0].data == (256, 0, 384, 480)
+    for topic in topics:
+        assert list(map(str, found[topic])) == list(map(str, expected['/' + topic]))
+
+
+@pytest.mark.parametrize('node_class, stored', [(PeopleNode, {'detector_node': {'detector': 'dept'}}),
+                                                (DetectorNode, {'detector': 'dept'})])
+def test_an_unknown_detector_is_an_error_that_names_the_known_ones(node_class, stored):
+    with masterless(stored), pytest.raises(ValueError, match="'dept'; did you mean depth.*depth, yolov5"):
+        node_class()
+
+
 def test_the_other_parts_of_people_node_do_not_wait_for_late_transforms(monkeypatch):
     """The detector would skip images meanwhile."""
     monkeypatch.setattr(tracker_node, 'Transforms', lambda _wait_s: Transforms(wait_s=3.0))
     camera, depth_mm = Camera(64, 48, 60.0, 60.0, 31.5, 23.5), np.full((48, 64), 2000, np.uint16)
     late = []
-    with masterless({'detector': 'none'}) as connections:
+    with masterless({'detector_node': {'detector': 'none'}}) as connections:
         monkeypatch.setattr(people_node, 'NewestWorker', NewestWorker)
         PeopleNode()
         for number in range(3):

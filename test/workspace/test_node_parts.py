@@ -30,13 +30,13 @@ IMAGE, UNUSABLE = Image(header=header_at(1000)), Image(header=header_at(1000))
 @pytest.mark.parametrize('name, parts, fault, place', [
     ('bbox3d_node', (), 'parameter ~stride is 0', '~stride: launch argument bbox3d_params:=FILE'),
     ('people_node', ('tracker_node', 'bbox3d_node'), '~stride is 0', '~stride: launch argument bbox3d_params:=FILE'),
-    ('yolov5_node', (), 'no ~weights given', '~weights: launch argument weights:='),
+    ('detector_node', (), 'no ~weights given', '~weights: launch argument weights:='),
     ('bbox3d_node', (), 'no ~frame_id', '~frame_id: launch argument frame_id:='),
     ('doctor', (), '~weights', '~weights')])
 def test_a_node_that_cannot_start_names_the_launch_argument(name, parts, fault, place):
     def node():
         raise ValueError(fault)
-    stored = {'/bbox3d_node': {'stride': 0}, '/tracker_node': {}, '/yolov5_node': {'weights': ''}}
+    stored = {'/bbox3d_node': {'stride': 0}, '/tracker_node': {}, '/detector_node': {'weights': ''}}
     with mock.patch.multiple(rospy, init_node=mock.DEFAULT, logfatal=mock.DEFAULT, get_name=lambda: '/' + name,
                              resolve_name=lambda each: '/' + each, get_param=lambda each, _none: stored[each]) \
             as mocked, mock.patch.object(startup, 'Registration'), pytest.raises(SystemExit):

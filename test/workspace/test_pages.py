@@ -17,6 +17,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.core.yaml_loader import load_yaml
 from ros_3d_bb.nodes.people_node import PeopleNode
 from ros_3d_bb.nodes.realsense_node import RealSenseNode
+from ros_3d_bb.planning.planner_outputs import NAMES
 from ros_3d_bb_lab.simulation.ros.simulator_node import SimulatorNode
 from support.code_blocks import BLOCKS, PAGES
 from support.inputs import TARGETS, Blind, send_image
@@ -29,7 +30,7 @@ NODES = {node.name: node for node in node_pages.nodes()}
 USED = set(name for name, node in NODES.items() if 'evaluation' not in node.node_class.__module__)  # not by benchmarks
 SCENARIO = os.path.join(ROOT, 'config', 'scenarios', 'empty_room.yaml')
 # Parameters with which nodes connect to all their topics; the other nodes are created as `TARGETS`.
-MORE_PARAMS = {'planner_bridge_node': {'outputs': 'costmap, people, teb, mpc, vision'},
+MORE_PARAMS = {'planner_bridge_node': {'outputs': ', '.join(NAMES)},
                'tracker_node': {'use_map': True}, 'speed_limit_node': {'use_scan': True},
                'realsense_node': {'publish_clock': True},
                'simulator_node': {'scenario': SCENARIO, 'drive': True, 'boxes': True, 'supervised': True}}
@@ -59,7 +60,7 @@ def documented(name, section):
 
 def test_each_node_has_a_script():
     scripts = set(name for name in os.listdir(os.path.join(ROOT, 'scripts')) if name.endswith('_node'))
-    assert set(NODES) == scripts and USED == set(TARGETS) | set(OTHERS)
+    assert set(NODES) == scripts and USED == set(name.split()[0] for name in TARGETS) | set(OTHERS)
 
 
 @pytest.mark.parametrize('path', sorted(CONFIG))
@@ -123,11 +124,19 @@ def test_named_files_and_launch_arguments_exist(page):
             assert set(re.findall(r'\b([a-z]\w*):=', code)) - known == set(), code
 
 
-PARAMETERS = {name: table_of(node_pages.parameter_types(NODES[name].node_class)) for name in TARGETS}
+def types_of(name):
+    """The types of the parameters of a node, which may depend on the detector."""
+    node, detector = NODES[name.split()[0]], TARGETS[name].params.get('detector')
+    if detector:
+        return node_pages.types_in_files(node)['config/%s.yaml' % detector]
+    return node_pages.parameter_types(node.node_class)
+
+
+PARAMETERS = {name: table_of(types_of(name)) for name in TARGETS}
 
 
 def accepts(name, values):
-    """Whether a node starts with these parameters; `yolov5_node` with a network that has the classes of the pages."""
+    """Whether a node starts with these parameters; a network has the classes of the pages."""
     with masterless(dict(TARGETS[name].params, **values)), mock.patch.object(Blind, 'names', COCO + ['wheelchair']):
         return TARGETS[name].make() is not None
 
@@ -157,6 +166,7 @@ def test_examples_of_live_parameters_are_accepted(name, given):
     """`dynparam` converts them to the type of the parameter; lists have the type text."""
     words = shlex.split(given)
     values = {words[0]: words[1]} if len(words) == 2 else load_yaml(words[0])
+    name = next(each for each in PARAMETERS if each.split()[0] == name and set(values) <= set(PARAMETERS[each]))
     kinds = {parameter: type(PARAMETERS[name][parameter].default) for parameter in values}
     assert all(PARAMETERS[name][parameter].live for parameter in values)
     assert accepts(name, {parameter: value if kinds[parameter] is tuple else kinds[parameter](value)

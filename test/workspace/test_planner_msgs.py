@@ -1,6 +1,7 @@
 """Tracks as planners read them: each message is serialized."""
 import os
 import sys
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -11,15 +12,17 @@ from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import PointCloud2
 
 from ros_3d_bb.camera.camera_model import transform_from, transform_points
+from ros_3d_bb.conversions import planner_msgs
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.conversions.planner_msgs import (detections3d_to_msg, objects_to_msg, obstacles_to_msg,
                                                 people_to_msg)
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeParams
-from ros_3d_bb.planning.planner_outputs import outputs_from
+from ros_3d_bb.planning.planner_outputs import OPTIONAL, Output, outputs_from
 from ros_3d_bb.planning.planner_view import footprint_points, in_frame, predicted_to
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE
+from support.code_blocks import blocks_in
 from support.masterless import on_the_wire
 from support.planner_definitions import PUBLISHED_MD5, message_class, package
 from support.ros import header_at
@@ -158,3 +161,16 @@ def test_the_shipped_costmap_clears_within_the_ring_and_times_out():
     people, clearing = (layer[name] for name in layer['observation_sources'].split())
     assert people['obstacle_range'] < clearing['raytrace_range'] <= PlannerBridgeParams().clearing_range
     assert all(0 < source['expected_update_rate'] < PlannerBridgeParams().timeout for source in (people, clearing))
+
+
+def test_the_example_of_an_output_converts_tracks():
+    """In CONTRIBUTING.md: a function in `planner_msgs`, and a row of OPTIONAL."""
+    blocks = [block.text for block in blocks_in('CONTRIBUTING.md') if 'poses_to_msg' in block.text]
+    names = dict(vars(planner_msgs), Output=Output)
+    exec(blocks[0], names)
+    exec('rows = {%s}' % blocks[1], names)
+    with mock.patch.dict(OPTIONAL, names['rows']):
+        output, = outputs_from(PlannerBridgeParams(outputs=['poses']))
+    message = on_the_wire(output.write([walker(1, (2.0, 3.0, 0.9), (0, 0, 0))], np.eye(4), header_at(1, 'map')))
+    assert isinstance(message, output.kind) and message.header.frame_id == 'map'
+    assert [(pose.position.x, pose.position.y, pose.position.z) for pose in message.poses] == [(2.0, 3.0, 0.9)]

@@ -82,7 +82,7 @@ def test_the_number_of_parallel_searches_does_not_matter(session_bag, weights, t
     session_bag(False)
     for searches in (1, 3):
         process_bag(str(tmp_path / 'in.bag'), str(tmp_path / ('%d.bag' % searches)),
-                    with_params(Settings(searches=searches), 'yolov5', weights=weights))
+                    with_params(Settings(searches=searches), 'detection', weights=weights))
     assert filecmp.cmp(str(tmp_path / '1.bag'), str(tmp_path / '3.bag'), shallow=False)
     found = messages_in(tmp_path / '1.bag')
     assert len(found['/yolo_bounding_box']) == len(found['/ros_3d_bb/bb_3d']) == 5
@@ -251,7 +251,8 @@ def test_broken_bags_are_named(scene, tmp_path, capsys):
 
 
 @pytest.mark.parametrize('arguments,complaint', [
-    ('a.bag', 'required: OUT'), ('a.bag a.bag --detector depth', 'also the input'), ('a.bag b.bag', 'needs --weights'),
+    ('a.bag', 'required: OUT'), ('a.bag a.bag --detector depth', 'also the input'),
+    ('a.bag b.bag', '~weights: --weights'),
     ('a.bag b.bag --detector depth --remap x', 'TOPIC_OF_THE_NODES:='),
     ('a.bag b.bag --detector depth --remap camera/colour/image_raw:=x', 'did you mean camera/color/image_raw?'),
     ('a.bag b.bag --detector depth --cameras left,right --remap camera/color/image_raw:=x', 'the nodes have no topic'),
@@ -278,7 +279,7 @@ def test_parameter_files_of_the_nodes_are_used(scene, tmp_path):
     (tmp_path / 'tracker.yaml').write_text('max_age: 2.0\ntarget_frame: odom\n')
     run_tool(scene, tmp_path / 'out.bag', '--detector', 'depth', '--tracker-params', tmp_path / 'tracker.yaml',
              '--bbox3d-params', os.path.join(config, 'bbox3d.yaml'),
-             '--depth-params', os.path.join(config, 'depth_detector.yaml'))
+             '--detector-params', os.path.join(config, 'depth.yaml'))
     assert messages_in(tmp_path / 'out.bag')['/ros_3d_bb/tracks'][-1].header.frame_id == 'odom'
 
 

@@ -13,7 +13,7 @@ from ros_3d_bb.conversions.camera_msgs import (DEPTH_TOPICS, START_NS, STATIC_TO
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg, time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
-from ros_3d_bb.nodes.depth_detector_node import DepthDetectorNode
+from ros_3d_bb.nodes.detector_node import DetectorNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.pipeline.people_pipeline import Settings
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
@@ -76,7 +76,7 @@ def boxes_in(path):
 
 def settings(depth='raw', detector='none'):
     made = Settings(detector=detector)
-    for node in ('depth', 'bbox3d', 'tracker'):
+    for node in ('detection', 'bbox3d', 'tracker'):
         made = with_params(made, node, depth=depth)
     return made
 
@@ -100,7 +100,8 @@ def test_the_nodes_publish_the_same(bag, tmp_path):
         process_bag(bag, str(tmp_path / depth), settings(depth, 'depth'))
         counts[depth] = [len(message.boxes) for message in boxes_in(tmp_path / depth)[0]]
     assert counts['raw'] == counts['aligned'] and sum(counts['raw']) > IMAGES
-    for node_class, params, topic in ((DepthDetectorNode, {}, BOXES_TOPIC), (Bbox3dNode, {}, BOXES3D_TOPIC),
+    for node_class, params, topic in ((DetectorNode, {'detector': 'depth'}, BOXES_TOPIC),
+                                      (Bbox3dNode, {}, BOXES3D_TOPIC),
                                       (TrackerNode, {'tf_timeout': 0.0}, TRACKS_TOPIC)):
         found = published(node_class, str(tmp_path / 'raw'), dict(params, depth='raw'), [topic])
         expected = messages_in(tmp_path / 'raw', '/' + topic)['/' + topic]

@@ -20,9 +20,9 @@ from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC
 from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.detection.yolov5.backends import open_detector
 from ros_3d_bb.pipeline.camera_pose import POSE_FITTED, POSE_TEXT, CameraPoseStage
 from ros_3d_bb.pipeline.detection_stage import CameraRotation, detect_in_color
+from ros_3d_bb.pipeline.detectors import NONE, open_named
 from ros_3d_bb.pipeline.people_pipeline import (DEPTH_INFO_TOPIC, INFO_TOPIC, INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA,
                                                 PeoplePipeline, Settings)
 
@@ -47,7 +47,7 @@ class BagRun(object):
 
     def __init__(self, reader: BagReader, settings: Settings, events: EventCounter) -> None:
         self._reader, self._settings, self._events = reader, settings, events
-        needed = BOXES_TOPIC if settings.detector == 'none' else COLOR_TOPIC
+        needed = BOXES_TOPIC if settings.detector == NONE else COLOR_TOPIC
         self._ahead_ns = int(settings.tracker[0].tf_timeout * NS)
         self._topics = {settings.name(topic): (topic, '') for topic in (TF_TOPIC, STATIC_TOPIC)}
         for camera_name in settings.camera_names:
@@ -58,11 +58,10 @@ class BagRun(object):
         self._unread_tf: Deque[Tuple[int, TFMessage]] = collections.deque()  # by time; not in the buffer yet
         self._pipeline = PeoplePipeline(settings, events, self._transforms)
         self._detector = None
-        if settings.detector == 'yolov5':
-            params, detection, running = settings.yolov5
-            self._detector = open_detector(params.weights, detection, running,
-                                           lambda line: events.note('remarks of the detector', line))
-            self._rotations = {name: CameraRotation(params, self._detector_transforms)
+        if settings.detector != NONE and not settings.uses_depth:
+            params = settings.detector_params
+            self._detector = open_named(events, *params)
+            self._rotations = {name: CameraRotation(params[0], self._detector_transforms)
                                for name in settings.camera_names}
         for camera_name in settings.camera_names:
             reader.check_topic(settings.name(needed, camera_name), *INPUTS[needed])
@@ -220,7 +219,7 @@ def _outputs_of(settings: Settings) -> Set[str]:
     """Return the names of the topics that the pipeline writes."""
     made = set(settings.name(topic) for topic in OUTPUTS)
     made.update(settings.name(topic, name) for topic in OUTPUTS_OF_CAMERA for name in settings.camera_names
-                if topic != BOXES_TOPIC or settings.detector != 'none')
+                if topic != BOXES_TOPIC or settings.detector != NONE)
     return made
 
 

@@ -17,13 +17,14 @@ from ros_3d_bb.core.params import IMAGE_ROTATION, nearest_name, params_from, wit
 from ros_3d_bb.core.yaml_loader import load_yaml
 from ros_3d_bb.estimation.box3d import REASONS
 from ros_3d_bb.pipeline.camera_pose import FLOOR, POSE_FITTED
-from ros_3d_bb.pipeline.people_pipeline import DETECTORS, INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA, TRACKED, Settings
+from ros_3d_bb.pipeline.detectors import DETECTORS, NONE, check_weights
+from ros_3d_bb.pipeline.people_pipeline import INPUTS, OUTPUTS, OUTPUTS_OF_CAMERA, TRACKED, Settings
 
 HIGHEST_M = 100.0
-IMAGE_NODES = 'yolov5', 'depth', 'bbox3d'
-FILES = (('--yolov5-params', 'yolov5'), ('--depth-params', 'depth'), ('--bbox3d-params', 'bbox3d'),
-         ('--tracker-params', 'tracker'))
-OPTIONS = 'weights', 'error_model', 'target_frame', 'cameras', 'depth', 'image_rotation'  # parameters with an option
+IMAGE_NODES = 'detection', 'bbox3d'
+FILES = (('--detector-params', 'detection'), ('--bbox3d-params', 'bbox3d'), ('--tracker-params', 'tracker'))
+# Parameters with an option.
+OPTIONS = 'detector', 'weights', 'error_model', 'target_frame', 'cameras', 'depth', 'image_rotation'
 
 
 def main(arguments: Optional[List[str]] = None) -> None:
@@ -37,7 +38,7 @@ def main(arguments: Optional[List[str]] = None) -> None:
             raise ValueError('--searches is %d; 0 or more expected' % given.searches)
         settings = _settings_from(given)
     except (ValueError, OSError, yaml.YAMLError) as error:
-        parser.error(str(error))
+        parser.error(with_places(str(error), _option_named))
     clean_up_on_sigterm()
     try:
         events = process_bag(given.source, given.target, settings)
@@ -47,7 +48,7 @@ def main(arguments: Optional[List[str]] = None) -> None:
     except Exception as error:  # a damaged bag can raise any exception
         print('%s; no bag was written' % _reason(given.source, settings, error), file=sys.stderr)
         sys.exit(1)
-    print('\n'.join(['%s:' % given.target] + _summary(events, settings.detector)))
+    print('\n'.join(['%s:' % given.target] + _summary(events, settings)))
     sys.exit(0)
 
 
@@ -58,23 +59,23 @@ def _settings_from(given: argparse.Namespace) -> Settings:
     for option, node in FILES:
         path = getattr(given, option[2:].replace('-', '_'))
         try:
-            parts: Any = read_params(path, getattr(settings, node))
+            parts: Any = read_params(path, params_of(settings, node))
             settings = settings._replace(**{node: parts})
         except (ValueError, OSError, yaml.YAMLError) as error:
             raise ValueError('%s: %s' % (option, error))
     cameras = given.cameras and [name.strip() for name in given.cameras.split(',')]
-    for node, name, value in (('yolov5', 'weights', given.weights), ('bbox3d', 'error_model', given.error_model),
+    for node, name, value in (('detection', 'detector', given.detector), ('detection', 'weights', given.weights),
+                              ('bbox3d', 'error_model', given.error_model),
                               ('tracker', 'error_model', given.error_model),
                               ('tracker', 'target_frame', given.target_frame), ('tracker', 'cameras', cameras)):
         if value:
             settings = with_params(settings, node, **{name: value})
-    for node in ('depth', 'bbox3d', 'tracker'):  # one kind of depth images for all
+    for node in ('detection', 'bbox3d', 'tracker'):  # one kind of depth images for all
         settings = with_params(settings, node, depth=given.depth or settings.bbox3d[0].depth)
     settings = _with_camera(settings, given)
     _check_names(settings)
-    if settings.detector == 'yolov5' and not settings.yolov5[0].weights:
-        raise ValueError('--detector yolov5 needs --weights FILE, a checkpoint such as yolov5n.pt; --detector depth '
-                         'needs none')
+    if settings.detector != NONE:
+        check_weights(settings.detection[0])
     return settings._replace(searches=given.searches or len(os.sched_getaffinity(0)))
 
 
@@ -108,7 +109,7 @@ def _with_camera(settings: Settings, given: argparse.Namespace) -> Settings:
         raise ValueError('%s is given with several cameras; expected with a single camera only' % option)
     for node in IMAGE_NODES:
         settings = with_params(settings, node, floor_frame=tracker.target_frame)
-    settings = with_params(settings, 'depth', floor_height=0.0)
+    settings = with_params(settings, 'detection', floor_height=0.0)
     return settings._replace(camera_pose=given.camera_pose or _given_pose(given))
 
 
@@ -123,9 +124,14 @@ def _given_pose(given: argparse.Namespace) -> Tuple[float, float, float]:
     return given.camera_height, given.camera_tilt, given.camera_roll
 
 
+def params_of(settings: Settings, node: str) -> Tuple[Any, ...]:
+    """Return the parameters of a node, 'detection', 'bbox3d' or 'tracker', in settings."""
+    return settings.detector_params if node == 'detection' else getattr(settings, node)
+
+
 def with_params(settings: Settings, node: str, **changed: Any) -> Settings:
     """Return settings with changed parameters of a node, which are in the first of its parameter classes."""
-    first, *others = getattr(settings, node)
+    first, *others = params_of(settings, node)
     parts: Any = (first._replace(**changed), *others)
     return settings._replace(**{node: parts})
 
@@ -151,23 +157,24 @@ def _reason(source: str, settings: Settings, error: Exception) -> str:
     if isinstance(error, BagError):
         return str(error)
     if isinstance(error, (ValueError, OSError)):
-        return '%s: %s' % (source, with_places(str(error), lambda name: option_of(name, settings.detector)))
+        return '%s: %s' % (source, with_places(str(error), lambda name: option_of(name, settings)))
     return '%s: %s: %s' % (source, type(error).__name__, cause(error))
 
 
-def option_of(name: str, detector: str) -> str:
-    """Return the option that sets a parameter of the nodes with a detector; empty if no node has it."""
-    if name in OPTIONS:
-        return '--' + name.replace('_', '-')
-    unused = {'yolov5', 'depth'} - {detector}
+def option_of(name: str, settings: Settings) -> str:
+    """Return the option that sets a parameter of the nodes with these settings; empty if no node has it."""
     files = [option + ' FILE' for option, node in FILES
-             if node not in unused and any(name in part._fields for part in getattr(Settings(), node))]
-    return ' and '.join(files)
+             if any(name in part._fields for part in params_of(settings, node))]
+    return _option_named(name) or ' and '.join(files)
 
 
-def _summary(events: EventCounter, detector: str) -> List[str]:
+def _option_named(name: str) -> str:
+    return '--' + name.replace('_', '-') if name in OPTIONS else ''
+
+
+def _summary(events: EventCounter, settings: Settings) -> List[str]:
     def placed(event: str) -> str:
-        return with_places(events.sentences[event], lambda name: option_of(name, detector))
+        return with_places(events.sentences[event], lambda name: option_of(name, settings))
 
     lines = ['  %7d  %s%s' % (count, event, '. The first: %s' % placed(event)
                               if event in events.sentences else '') for event, count in events.counts.items()]
@@ -204,11 +211,11 @@ def _parser() -> argparse.ArgumentParser:
                                      'and markers. Equal inputs give identical bytes.')
     parser.add_argument('source', metavar='IN', help='bag to process')
     parser.add_argument('target', metavar='OUT', help='bag to write')
-    parser.add_argument('--detector', choices=DETECTORS, default='yolov5',
+    parser.add_argument('--detector', choices=sorted(DETECTORS) + [NONE], default='yolov5',
                         help='none: use the 2D boxes in the bag (default: yolov5)')
     parser.add_argument('--weights', metavar='FILE', help='checkpoint or export for yolov5')
     for option, node in FILES:
-        config = {'depth': 'depth_detector'}.get(node, node)
+        config = {'detection': 'DETECTOR'}.get(node, node)
         parser.add_argument(option, metavar='FILE', help='parameter file in the format of config/%s.yaml' % config)
     parser.add_argument('--error-model', metavar='FILE', help='error model for the 3D boxes')
     parser.add_argument('--depth', choices=DEPTH_TOPICS, help='raw: the depth images are not aligned to colour; they '
@@ -230,7 +237,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--remap', action='append', default=[], metavar='TOPIC:=TOPIC',
                         help="a topic of the nodes and its name in the bag")
     parser.add_argument('--keep', nargs='*', metavar='TOPIC', help='topics of the input to copy (default: all)')
-    parser.add_argument('--searches', type=int, default=0, metavar='N', help='number of images that yolov5 processes '
-                        'in parallel (default: the number of cores); does not affect the result')
+    parser.add_argument('--searches', type=int, default=0, metavar='N', help='number of images in which a '
+                        'detector without depth runs in parallel (default: the number of cores); does not affect the '
+                        'result')
     parser.add_argument('--compression', choices=('none', 'bz2', 'lz4'), default='lz4', help='default: lz4')
     return parser

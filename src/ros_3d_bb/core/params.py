@@ -51,10 +51,8 @@ DEPTH = Param('aligned', choices=('aligned', 'raw'))
 STAMP_TOLERANCE = Param(0.0, 'Largest difference between the stamps of a colour and a depth image that belong '
                         'together. 0: half of the period of the depth images.', 's')
 IMAGE_ROTATION = Param('auto', choices=('auto', '0', '90', '180', '270'))
-ENABLED = Param(True, 'Whether the detector runs from the start. The service ~enable changes it.')
 CLASSES_FILE = Param('', 'Absolute path of a table of the classes of objects, in the format of config/classes.yaml; '
                      'empty: that table. All nodes need the same table.')
-PUBLISH_EMPTY = Param(True, 'Whether an empty array is published where no people are detected, so that tracks age.')
 ROBOT_FRAME = Param('base_link')
 TRACKS_TIMEOUT = Param(
     0.5, 'Age of the newest tracks, from the stamp of their image, from which on there are none. More than the '

@@ -17,7 +17,7 @@ MAX_INPUT_PX = 4096  # larger inputs exhaust the memory
 MAX_CANDIDATES = 30000  # maximum number of boxes before suppression, as in ultralytics
 
 
-@parameters()
+@parameters('Detector yolov5')
 class DetectionParams(NamedTuple):
     """What counts as a detection."""
 
@@ -31,10 +31,10 @@ class DetectionParams(NamedTuple):
     max_det: int = Param(
         100, 'Largest number of detections in an image; the best ones are kept.', limits=(1, LARGEST), live=(1, 300))
     detection_range: float = Param(
-        8.0, 'Range within which people should be detected. It limits how far yolov5_node reduces the input of the '
+        8.0, 'Range within which people should be detected. It limits how far the node reduces the input of the '
         'network: larger ranges take more CPU time.', 'm', limits=(0.5, 100), live=(1, 20))
     image_size: int = Param(
-        0, "Longer side of the network's input, rounded up to its stride (32, P6 models 64). 0: yolov5_node chooses "
+        0, "Longer side of the network's input, rounded up to its stride (32, P6 models 64). 0: the node chooses "
         'the largest of 320, 384, 448, 512, 576 and 640 that keeps up with the images, but none that is too small for '
         'detection_range; bags and benchmarks use 640. Exports with a fixed size ignore it.', 'pixels',
         limits=(0, MAX_INPUT_PX), live=(0, 1280))

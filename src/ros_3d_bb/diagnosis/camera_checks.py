@@ -7,7 +7,7 @@ from ros_3d_bb.diagnosis.roles import INFO
 from ros_3d_bb.diagnosis.tf_tree import root_of
 
 UNIT_FIX = ('correct the driver, or set depth_scale to metres per unit in config/bbox3d.yaml, config/tracker.yaml and, '
-            'for detector:=depth, config/depth_detector.yaml: 1.0 for metres, 0.001 for millimetres')
+            'for detector:=depth, config/depth.yaml: 1.0 for metres, 0.001 for millimetres')
 NO_DEPTH_FIX = ('pass the topic of depth images in 16UC1 or 32FC1 (camera_depth:=TOPIC); compressed ones end in '
                 '/compressedDepth: JPEG changes depth')
 
@@ -51,7 +51,7 @@ def check_alignment(seen):
                       'and camera_info must be those of colour; if not: ' + ALIGN)
     elif of_frames:
         yield Finding('alignment', '', of_frames + ', although depth has the pixels of colour',
-                      'pass frame_id:=%s (process_bag: frame_id in the files of --bbox3d-params and --depth-params)'
+                      'pass frame_id:=%s (process_bag: frame_id in the files of --bbox3d-params and --detector-params)'
                       % seen.color_info.message.header.frame_id, False)
     else:
         beside = '; %s, but the images agree, and those of colour are used' % of_info if of_info else ''

@@ -186,7 +186,7 @@ def _mount(seen):
         yield Finding('depth unit', '', '%d people are found in %d images, and %d if depth is multiplied by %g'
                       % (mount.people[0], mount.images, mount.factors[factor][0], factor),
                       'set depth_scale: %g in config/bbox3d.yaml, config/tracker.yaml and, for detector:=depth, '
-                      'config/depth_detector.yaml' % (factor * seen.depth.converted.scale_m))
+                      'config/depth.yaml' % (factor * seen.depth.converted.scale_m))
     if tf is None or not tf.fault:
         return
     if mount.turns:

@@ -11,6 +11,7 @@ from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.diagnosis.roles import COLOR, DEPTH, TRACKS, needed_images
 from ros_3d_bb.diagnosis.tf_tree import frames_in, is_fixed_root, optical_frames, root_of
 from ros_3d_bb.diagnosis.topic_faults import other_topic
+from ros_3d_bb.pipeline.detectors import NONE, without_weights
 
 DEFAULT_TARGET = 'map'  # of process_bag and doctor
 MIN_ROLL_RAD = 0.02  # smaller ones are within the error of the fitted floor
@@ -61,7 +62,7 @@ def next_command(bag, seen, found):
     pose = None if fatal - CORRECTED else _pose(seen, fatal, target)
     if pose is None:
         return '', ''
-    detector = 'depth' if COLOR in needed_images(seen) else 'none'
+    detector = without_weights()[0] if COLOR in needed_images(seen) else NONE
     command = '%srosrun ros_3d_bb process_bag %s tracked.bag --detector %s%s%s%s && %s' % (
         pose.preparation, quote(bag), detector, reading.option, reading.remappings(' --remap '), pose.options,
         REPORT % ('tracked.bag', _color_option(reading, seen)))
@@ -134,7 +135,7 @@ def _pose_of_other_frame(tf, target):
 
 def _pose_in_frame(frame_id, target, reason):
     """Return the Pose with which a frame replaces that of the images."""
-    options = '%s --bbox3d-params %s --depth-params %s' % (target, FRAME_FILE, FRAME_FILE)
+    options = '%s --bbox3d-params %s --detector-params %s' % (target, FRAME_FILE, FRAME_FILE)
     preparation = 'echo %s > %s && ' % (quote('frame_id: ' + frame_id), FRAME_FILE)
     return Pose(options, '; %s is %s' % (frame_id, reason), preparation)
 

@@ -14,7 +14,7 @@ ROLES = {
     DEPTH: Role('depth images', DEPTH_TOPIC, IMAGE, 'camera_depth', CAMERA, CAMERA_SILENT),
     INFO: Role('camera_info', INFO_TOPICS[0], 'sensor_msgs/CameraInfo', 'camera_info', CAMERA, CAMERA_SILENT),
     BOXES2D: Role('2D boxes', BOXES_TOPIC, 'std_msgs/Int32MultiArray', 'bb_topic',
-                  'a detector (pipeline.launch detector:=yolov5 or depth)', DETECTOR_SILENT),
+                  'a detector (pipeline.launch, without detector:=none)', DETECTOR_SILENT),
     BOXES3D: Role('3D boxes', BOXES3D_TOPIC, 'ros_3d_bb/BoundingBox3DArray', '', 'bbox3d_node (pipeline.launch)',
                   'see its log'),
     TRACKS: Role('tracks', TRACKS_TOPIC, 'ros_3d_bb/TrackedObjectArray', '', 'tracker_node (pipeline.launch)',

@@ -28,7 +28,7 @@ class CameraPipeline(object):
     def connect_detector(self, detect: Callable[[RgbdFrame], Optional[Detections]],
                          offer: Callable[[Image, Image, Camera], Any]) -> None:
         """Pass colour images with the messages that match them to `offer`. It passes them on to `self.detect`, at once
-        or in a thread of its own; `detect` is that of the DepthDetectionStage."""
+        or in a thread of its own; `detect` is that of a `Detector` that uses depth."""
         self._detect, self._offer = detect, offer
 
     def connect_estimator(self, estimate: Callable[[RgbdFrame, Boxes2D], List[Box3D]], events: EventCounter,
@@ -49,10 +49,13 @@ class CameraPipeline(object):
     def detect(self, color_msg: Image, depth_msg: Image,
                camera: Camera) -> Optional[Tuple[Any, Detections, RgbdFrame, Image]]:
         """Return the RGB image of matched messages and its Detections, followed by the arguments with which `estimate`
-        continues; None while the floor is unknown. Raises ValueError as `RgbdSource.frame`."""
+        continues; None if there is no result. Raises ValueError as `RgbdSource.frame`."""
         frame, depth_msg = self._frame(color_msg, depth_msg, camera)
         detections = self._detect(frame)
-        return None if detections is None else (frame.received.color, detections, frame, depth_msg)
+        if detections is None:
+            return None
+        received = detections._replace(boxes=frame.received_rects(detections.boxes))
+        return frame.received.color, received, frame, depth_msg
 
     def estimate(self, boxes2d_msg: Int32MultiArray, frame: RgbdFrame, depth_msg: Image) -> None:
         """Process the published 2D boxes of a detection."""

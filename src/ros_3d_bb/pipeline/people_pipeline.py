@@ -17,12 +17,10 @@ from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, T
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.detection.boxes import Detections
-from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
-from ros_3d_bb.detection.network_detector import DetectionParams
-from ros_3d_bb.detection.yolov5.backends import RuntimeParams
+from ros_3d_bb.detection.detector import DetectorParams
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.pipeline.camera_pipeline import CameraPipeline
-from ros_3d_bb.pipeline.detection_stage import DepthDetectionStage, DepthDetectorParams, Yolov5NodeParams
+from ros_3d_bb.pipeline.detectors import NONE, open_named, row_named
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams, EstimationStage
 from ros_3d_bb.pipeline.rgbd_source import OnMatch, RgbdSource
 from ros_3d_bb.pipeline.tracking_stage import TrackerNodeParams, TrackingStage
@@ -38,22 +36,20 @@ INPUTS = {COLOR_TOPIC: IMAGE_KINDS, DEPTH_TOPIC: IMAGE_KINDS, INFO_TOPIC: (Camer
           DEPTH_INFO_TOPIC: (CameraInfo,), BOXES_TOPIC: (Int32MultiArray,), TF_TOPIC: (TFMessage,),
           STATIC_TOPIC: (TFMessage,)}
 OUTPUTS_OF_CAMERA, OUTPUTS = (BOXES_TOPIC, BOXES3D_TOPIC), (TRACKS_TOPIC, MARKERS_TOPIC)
-DETECTORS = 'yolov5', 'depth', 'none'
 TRACKED = 'images with tracks'  # event
 
 
 class Settings(NamedTuple):
     """Detector, parameters of each node, and topics; for bags also concurrent searches and compression.
 
+    `detection` has the DetectorParams and those of the detector; the defaults if it is empty.
     `names` maps topics of the nodes to those used; `keep` lists the topics to copy (None: all). `camera_pose` is the
     height, metres, tilt and roll, radians, of a camera without tf (see `images.mounted_camera`), or
     `camera_pose.FLOOR`, if they are fitted to the floor.
     """
 
     detector: str = 'yolov5'
-    yolov5: Tuple[Yolov5NodeParams, DetectionParams, RuntimeParams] = (
-        Yolov5NodeParams(), DetectionParams(), RuntimeParams(device='cpu', threads=1))
-    depth: Tuple[DepthDetectorParams, DepthPeopleParams] = (DepthDetectorParams(), DepthPeopleParams())
+    detection: Tuple[Any, ...] = ()
     bbox3d: Tuple[Bbox3dParams] = (Bbox3dParams(),)
     tracker: Tuple[TrackerNodeParams, MarkerParams, TrackerParams, NoiseParams, PredictionParams] = (
         TrackerNodeParams(), MarkerParams(), TrackerParams(), NoiseParams(), PredictionParams())
@@ -66,10 +62,22 @@ class Settings(NamedTuple):
     @property
     def inputs(self) -> Set[str]:
         """The topics of `INPUTS` that are used."""
-        unused = {COLOR_TOPIC if self.detector == 'none' else BOXES_TOPIC}
+        unused = {COLOR_TOPIC if self.detector == NONE else BOXES_TOPIC}
         if self.bbox3d[0].depth != RAW:
             unused.add(DEPTH_INFO_TOPIC)
         return set(INPUTS) - unused
+
+    @property
+    def detector_params(self) -> Tuple[Any, ...]:
+        """The parameters of the detector. Raises ValueError if it is unknown."""
+        if self.detection or self.detector == NONE:
+            return self.detection or (DetectorParams(NONE),)
+        return row_named(self.detector).defaults(self.detector)
+
+    @property
+    def uses_depth(self) -> bool:
+        """Whether there is a detector that uses depth."""
+        return self.detector != NONE and row_named(self.detector).uses_depth
 
     @property
     def camera_names(self) -> Tuple[str, ...]:
@@ -87,32 +95,32 @@ class Settings(NamedTuple):
                on_match: OnMatch) -> RgbdSource:
         """Return the RgbdSource of a camera for detection and estimation. ValueError if their parameters differ."""
         params = self.bbox3d[0]
-        if self.detector == 'depth':
-            check_equal(self.depth[0], params)
+        if self.uses_depth:
+            check_equal(self.detector_params[0], params)
         topics = [self.name(topic, camera_name) for topic in (DEPTH_TOPIC, DEPTH_INFO_TOPIC, INFO_TOPIC)]
         return RgbdSource(params, events, on_match, transforms, topics, params.cache_length, params.assumed_delay)
 
 
 def check_equal(detector_params: Any, bbox3d_params: Bbox3dParams) -> None:
-    """Raise ValueError if parameters of depth_detector_node and bbox3d_node that both have differ."""
+    """Raise ValueError if parameters of detector_node and bbox3d_node that both have differ."""
     for name in set(detector_params._fields).intersection(bbox3d_params._fields):
         values = getattr(detector_params, name), getattr(bbox3d_params, name)
         if values[0] != values[1]:
-            raise ValueError('parameter ~%s is %r for depth_detector_node and %r for bbox3d_node; equal values '
-                             'expected, because both use the same images' % ((name,) + values))
+            raise ValueError('parameter ~%s is %r for detector_node and %r for bbox3d_node; equal values expected, '
+                             'because both use the same images' % ((name,) + values))
 
 
 class PeoplePipeline(object):
     """The CameraPipeline of each camera, and tracking, on a bag. Collects what the nodes would publish.
 
-    Networks detect without depth and are therefore outside: their detections are passed to `add_detections`.
+    Detectors of colour images are outside: their detections are passed to `add_detections`.
     Raises ValueError if one of the Settings is invalid.
     """
 
     def __init__(self, settings: Settings, events: EventCounter, transforms: TransformBuffer) -> None:
         self._settings, self._events = settings, events
         self._results: List[Tuple[str, Any]] = []
-        self._publish_empty = (settings.depth if settings.detector == 'depth' else settings.yolov5)[0].publish_empty
+        self._publish_empty = settings.detector_params[0].publish_empty
         tracker_params, marker_params = settings.tracker[:2]
         self._markers = MarkerWriter(marker_params)
         self._tracking_stage = TrackingStage(tracker_params, settings.tracker[2:], events, transforms, self._on_tracks)
@@ -122,9 +130,9 @@ class PeoplePipeline(object):
             pipeline = self._cameras[camera_name] = CameraPipeline(source_for)
             pipeline.connect_estimator(EstimationStage(settings.bbox3d[0], events).estimate, events,
                                        functools.partial(self._on_boxes3d, camera_name))
-            if settings.detector == 'depth':
-                pipeline.connect_detector(DepthDetectionStage(*settings.depth, events).detect,
-                                          functools.partial(self._detect, camera_name))
+            if settings.uses_depth:
+                detector = open_named(events, *settings.detector_params)
+                pipeline.connect_detector(detector.detect, functools.partial(self._detect, camera_name, detector.names))
         self._now_ns = 0  # time of the message that is being processed
 
     def take(self, topic: str, message: Any, now_ns: int, camera_name: str = '') -> None:
@@ -176,13 +184,14 @@ class PeoplePipeline(object):
         for pipeline in self._cameras.values():
             pipeline.source.end()
 
-    def _detect(self, camera_name: str, color_msg: Image, *matched: Any) -> None:
+    def _detect(self, camera_name: str, names: Sequence[str], color_msg: Image, *matched: Any) -> None:
         with self.detecting():
             detected = self._cameras[camera_name].detect(color_msg, *matched)
             if detected is None:
                 return
+            self._events.count('images processed')
             image, detections, *shown = detected
-            message = self._boxes2d(camera_name, color_msg.header, image, detections, DepthDetectionStage.names)
+            message = self._boxes2d(camera_name, color_msg.header, image, detections, names)
             if message is not None:
                 self._cameras[camera_name].estimate(message, *shown)
 

@@ -1,6 +1,6 @@
 """Detectors on the images of a measurement session: people found, overlap with the recorded boxes, and CPU time.
 
-Any number of models, of any format, and the detector without weights (`depth`) process each image in turn, so that
+Any number of models, of any format, and the detectors without weights process each image in turn, so that
 other load on the machine affects all of them equally and the ratios of their times remain valid. Times are CPU times
 from the image to the boxes, with one thread. Scores differ between families of networks, so the confidence with the
 highest F1 score is given for each network.
@@ -13,11 +13,11 @@ import cv2
 import numpy as np
 
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.network_detector import MAX_INPUT_PX, DetectionParams
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb_lab.evaluation.defaults import data_folder, default_weights, describe_machine, in_range
 from ros_3d_bb_lab.evaluation.detection_ranges import found_at_ranges
+from ros_3d_bb_lab.evaluation.detectors import weight_free_detectors
 from ros_3d_bb_lab.evaluation.progress import with_progress
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb_lab.evaluation.text_table import table_of
@@ -25,7 +25,6 @@ from ros_3d_bb_lab.evaluation.text_table import table_of
 FOUND_IOU = 0.5
 CONFIDENCES = np.arange(5, 100) / 100.0  # among which the best one is searched
 WARM_UPS = 3  # images that are not timed
-DEPTH = 'depth'  # the row of the detector without weights
 SIMULATED = (2.0, 3.0, 4.0), (-0.25, 0.0, 0.25), 1  # arguments of write_simulated_session
 
 
@@ -45,26 +44,15 @@ def open_networks(paths, confidence, sizes=(0,)):
     return networks
 
 
-def boxes_of(network):
-    """Function of a color and a depth image that returns the boxes (n, 4) of a NetworkDetector."""
-    return lambda color, _depth: network.detect(color).boxes
-
-
-def depth_detector(camera):
-    """As `boxes_of`, for the detector without weights. It fits the floor to the depth images."""
-    people = DepthPeople()
-
-    def detect(color, depth):
-        detections = people.detect(color, depth, camera)
-        return np.zeros((0, 4)) if detections is None else detections.boxes
-
-    return detect
+def ignoring_depth(network):
+    """Function of a color and a depth image that returns the Detections of a NetworkDetector."""
+    return lambda color, _depth: network.detect(color)
 
 
 def compare(session, detectors):
     """Run detectors on the images of a session that have recorded boxes. Raises ValueError if there are none.
 
-    `detectors` are functions, by name, of a color image and a DepthImage that return boxes (n, 4). Returns a
+    `detectors` are functions, by name, of a color image and a DepthImage that return Detections. Returns a
     dictionary: `frames`, their number; `boxes`, the number of their boxes; and `detectors`, by name: `found` boxes with
     an IoU of at least 0.5, `median_iou` of all recorded boxes with the best detection (0 without), `false_boxes`
     without a recorded box, and `cpu_ms`, the median of the CPU times.
@@ -77,7 +65,7 @@ def compare(session, detectors):
         recorded = np.array(frame.boxes_px, float)
         for name, detect in detectors.items():
             start_s = time.process_time()
-            found = detect(*images)
+            found = detect(*images).boxes
             spent_ms = 1e3 * (time.process_time() - start_s)
             if number >= len(warm_up):
                 table = np.zeros((len(recorded), len(found) + 1))  # the last column: no box
@@ -139,8 +127,8 @@ def run(arguments):
             rows = found_at_ranges(annotated_frames(session), session.camera, networks, arguments.ranges, FOUND_IOU)
             print('\n'.join(table_of(rows)))
             return {'machine': describe_machine(), 'ranges': rows}
-        detectors = {name: boxes_of(network) for name, network in networks.items()}
-        detectors[DEPTH] = depth_detector(session.camera)
+        detectors = {name: ignoring_depth(network) for name, network in networks.items()}
+        detectors.update(weight_free_detectors(session.camera))
         result = dict(compare(session, detectors), machine=describe_machine())
         rows = result['detectors']
         for name, network in networks.items():

@@ -9,25 +9,25 @@ from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.object_classes import PERSON
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import Detections, iou
-from ros_3d_bb.detection.depth.detector import DepthPeople
-from ros_3d_bb.detection.depth.ground_plane import floor_from_transform
 from ros_3d_bb.estimation.appearance import appearance_of
 from ros_3d_bb.estimation.box3d import plausible
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
+from ros_3d_bb.pipeline.detectors import without_weights
 from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import VISIBLE, CameraView, detections_from_boxes
 from ros_3d_bb_lab.evaluation.clear_mot import ClearMatcher, Moment, distance_m, score
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, add_scenarios, scene_name
+from ros_3d_bb_lab.evaluation.detectors import detector_of
 from ros_3d_bb_lab.evaluation.text_table import line_of
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, SimulatedFrame, Simulator, is_in_image, jittered_boxes
 
 FOUND_IOU = 0.5  # minimum IoU of a true positive
 RANGE_M = {'yolov5': (2.0, 8.0), 'depth': (2.0, 6.0), 'exact': (0.5, 8.0)}  # evaluated range of each detector
-EVERY = {'yolov5': 2, 'depth': 2, 'exact': 1}  # every n-th image is used
+EVERY = 2  # every n-th image is used, but each one with exact boxes
 NEAREST_M = 0.5  # minimum distance from the camera in the plane
 HELD_M = 0.5  # maximum distance between a person and a matching track
 ROUNDING_M = 1e-6
@@ -85,11 +85,11 @@ def view_of(depth, camera, fixed_from_camera, name):
     return CameraView(fixed_from_camera, camera, name, functools.partial(depths_towards, camera, depth))
 
 
-def depth_detector(simulator):
-    """Weight-free detector for `run_scene`. It receives the floor plane that tf provides on a robot."""
-    detector = DepthPeople()
-    return lambda frame: detector.detect(frame.color, DepthImage(frame.depth_mm, 0.001), simulator.camera,
-                                         floor_from_transform(np.linalg.inv(frame.poses.map_from_camera)))
+def detector_in(simulator, name):
+    """Detector without weights for `run_scene`. It receives the floor plane that tf provides on a robot."""
+    detect = detector_of(name, simulator.camera)
+    return lambda frame: detect(frame.color, DepthImage(frame.depth_mm, 0.001),
+                                np.linalg.inv(frame.poses.map_from_camera))
 
 
 def yolov5_detector(weights):
@@ -202,7 +202,7 @@ def result_of(steps, detector, camera=D435I_COLOR):
 
     Lengths are in metres and shares are 0..1. Errors are aggregated over all people in the scene.
     """
-    people, found, false = score_detections(steps, *RANGE_M[detector])
+    people, found, false = score_detections(steps, *RANGE_M.get(detector, RANGE_M['depth']))
     tracked = score([step.moment for step in steps])
     followed = [person for person in tracked.people if person.ids]
     result = {'detector': detector, 'images': len(steps), 'people': len(tracked.people),
@@ -230,10 +230,11 @@ def add_options(parser):
 def _run(path, yolov5):
     """Run one scene with each detector and print the results. The error model applies only to the boxes of `exact`."""
     name, simulator, results = scene_name(path), Simulator(read_scenario(path)), []
-    for detector, detect, model in (('depth', depth_detector(simulator), None), ('yolov5', yolov5, None),
-                                    ('exact', exact_detector(simulator), read_error_model(SIMULATED_ERROR_MODEL))):
+    cases = [(detector, detector_in(simulator, detector), None) for detector in without_weights()]
+    cases += [('yolov5', yolov5, None), ('exact', exact_detector(simulator), read_error_model(SIMULATED_ERROR_MODEL))]
+    for detector, detect, model in cases:
         if detect is not None:
-            steps = run_scene(simulator, detect, EVERY[detector], error_model=model)
+            steps = run_scene(simulator, detect, 1 if detector == 'exact' else EVERY, error_model=model)
             result = result_of(steps, detector, simulator.camera)
             print(line_of(name, **result), flush=True)
             results.append(dict(result, scene=name))

@@ -34,7 +34,7 @@ PART_WIDTH_M, PART_VISIBLE_M, PART_TOP_M = 0.1, 0.25, 1.0
 TWO_LAYERS = 0.7  # between-class share of the variance of two depth layers; 0.64 for noise, 0.75 for a slanted wall
 
 
-@parameters()
+@parameters('Detector depth')
 class DepthPeopleParams(NamedTuple):
     """What counts as a person, who may be smaller if cut by the image border, and limits of a fitted floor."""
 

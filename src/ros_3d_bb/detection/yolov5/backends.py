@@ -23,7 +23,7 @@ MAX_THREADS = 4  # default maximum; small networks gain little from more threads
 SMALL_BYTES = 6 * 10 ** 6
 
 
-@parameters()
+@parameters('Detector yolov5')
 class RuntimeParams(NamedTuple):
     """What runs the network, and where."""
 
@@ -57,11 +57,8 @@ def open_detector(weights, detection=DetectionParams(), running=RuntimeParams(),
     Raises
     ------
     ValueError
-        If no weights are given or the network cannot be used.
+        If the network cannot be used.
     """
-    if not weights:
-        raise ValueError('no weights given; set ~weights to the path of a YOLOv5 checkpoint such as yolov5n.pt, or '
-                         'of an ONNX file of another detector')
     detector = NetworkDetector(open_runtime(os.path.abspath(os.path.expanduser(weights)), running, warn), detection)
     detector.detect(np.zeros((480, 640, 3), np.uint8))  # the first detection takes several times as long as others
     return detector

@@ -11,10 +11,10 @@ from ros_3d_bb.nodes.common.master import Registration
 
 # Launch arguments for the parameter files of nodes.
 PARAMS_FILES = {'%s_node' % name: '%s_params' % name for name in (
-    'bbox3d', 'camera_pose', 'depth_detector', 'planner_bridge', 'realsense', 'tracker', 'viewer', 'yolov5')}
+    'bbox3d', 'camera_pose', 'detector', 'planner_bridge', 'realsense', 'tracker', 'viewer')}
 PARAMS_FILES.update({'%s_node' % name: 'params' for name in ('follow', 'people_removal', 'speed_limit')})
 # Parameters that are named by the launch argument of the same name, not by a file, which few have for them.
-ARGUMENTS = 'weights', 'scenario', 'window', 'frame_id'
+ARGUMENTS = 'detector', 'weights', 'scenario', 'window', 'frame_id'
 POLL_S = 0.05
 SETTLING_S = 1.0  # a node that has connected to one topic may still be connecting to the others
 SENDING_S = 1.0  # from the last message to the exit: rospy drops messages that it has not sent before the shutdown

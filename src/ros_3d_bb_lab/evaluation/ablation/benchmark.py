@@ -21,6 +21,7 @@ from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb_lab.evaluation import accuracy, scene_benchmark
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, data_folder, default_weights, scenario_path
 from ros_3d_bb_lab.evaluation.detector_benchmark import open_networks
+from ros_3d_bb_lab.evaluation.detectors import detector_of
 from ros_3d_bb_lab.evaluation.text_table import lines_of
 from ros_3d_bb_lab.evaluation.tracking.benchmark import outputs_of
 from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
@@ -181,8 +182,8 @@ def videos(arguments):
             (network,) = open_networks([arguments.weights], DetectionParams().confidence).values()
             detected = [network.detect(color) for _name, color, _depth in images]
         else:
-            detect = video_benchmark.depth_detector(video, pose)
-            detected = [detect(color, depth) for _name, color, depth in images]
+            detect, camera_from_floor = detector_of('depth', video.camera), np.linalg.inv(pose)
+            detected = [detect(color, depth, camera_from_floor) for _name, color, depth in images]
 
         def scores():
             replayed = iter(detected)

@@ -115,7 +115,7 @@ def run(arguments):
 
 def add_options(parser):
     add_scenarios(parser, 'thesis_*')
-    parser.add_argument('--weights', metavar='FILE', help='network of yolov5_node; without it, depth_detector_node')
+    parser.add_argument('--weights', metavar='FILE', help='network of the detector yolov5; without it, depth')
 
 
 def _run(path, detector):

@@ -6,6 +6,7 @@ import sys
 import tempfile
 from typing import NamedTuple
 
+from ros_3d_bb.pipeline.detectors import without_weights
 from ros_3d_bb_lab.evaluation.defaults import default_weights, describe_machine, in_range, scenario_path
 from ros_3d_bb_lab.evaluation.latency.latency_result import result_of
 from ros_3d_bb_lab.evaluation.launching import recorded
@@ -32,7 +33,7 @@ def cases_of(weights):
     file with the largest input, and precomputed 2D boxes.
     """
     detectors = [(os.path.splitext(os.path.basename(path))[0], 'yolov5', 0, path) for path in weights]
-    detectors += [('depth', 'depth', 0, '')]
+    detectors += [(name, name, 0, '') for name in without_weights()]
     detectors += [(name + '-640', 'yolov5', 640, path) for name, _detector, _size, path in detectors[:len(weights[:1])]]
     detectors += [('free', 'none', 0, '')]
     return [Case(name + ('+load' if loaded else ''), detector, size, path, loaded)

@@ -5,6 +5,7 @@ import tempfile
 
 import yaml
 
+from ros_3d_bb.pipeline.detectors import without_weights
 from ros_3d_bb_lab.evaluation.defaults import describe_machine, in_range
 from ros_3d_bb_lab.evaluation.launching import recorded
 from ros_3d_bb_lab.evaluation.navigation.navigation_scenes import GOAL_M, RATE_HZ, SCENES, scenario_of
@@ -27,8 +28,8 @@ def run_trial(scene, mode, seed, folder, arguments):
         yaml.safe_dump(scenario_of(scene, seed, arguments.rate), stream)
     launch_arguments = {'scenario': name + '.yaml', 'mode': mode, 'goal_x': GOAL_M[0], 'goal_y': GOAL_M[1],
                         'local_planner': arguments.planner}
-    if arguments.detector == 'depth':
-        launch_arguments['detector'] = 'depth'
+    if arguments.detector in without_weights():
+        launch_arguments['detector'] = arguments.detector
     elif arguments.detector != TRUE_BOXES:
         launch_arguments.update(detector='yolov5', weights=os.path.abspath(arguments.detector))
     record = recorded('navigation_benchmark.launch', launch_arguments, name, TRIAL_TIMEOUT_S)
@@ -37,8 +38,9 @@ def run_trial(scene, mode, seed, folder, arguments):
 
 def run(arguments):
     """Run all trials."""
-    if arguments.detector not in (TRUE_BOXES, 'depth') and not os.path.isfile(arguments.detector):
-        raise ValueError('--detector %s: exact, depth or the path of a file expected' % arguments.detector)
+    names = [TRUE_BOXES] + without_weights()
+    if arguments.detector not in names and not os.path.isfile(arguments.detector):
+        raise ValueError('--detector %s: %s or the path of a file expected' % (arguments.detector, ', '.join(names)))
     print(describe_machine(), flush=True)
     trials = []
     with tempfile.TemporaryDirectory() as folder:
@@ -63,9 +65,9 @@ def add_options(parser):
     parser.add_argument('--modes', type=_names_of(MODES), default=list(MODES), metavar='A,B',
                         help='some of %s' % ', '.join(MODES))
     parser.add_argument('--planner', choices=PLANNERS, default='dwa', help='local planner (default: dwa)')
-    parser.add_argument('--detector', default=TRUE_BOXES, metavar='exact|depth|FILE',
+    parser.add_argument('--detector', default=TRUE_BOXES, metavar='exact|NAME|FILE',
                         help='2D boxes of the modes ours and limited: true ones with a jitter of 1 pixel; '
-                        'depth_detector_node; yolov5_node with these weights (default: exact)')
+                        'a detector without weights, such as depth; yolov5 with these weights (default: exact)')
     parser.add_argument('--rate', type=in_range(float, 1, 30), default=RATE_HZ, metavar='HZ',
                         help='images per second of each camera (default: %g)' % RATE_HZ)
     parser.add_argument('--logs', metavar='DIR',

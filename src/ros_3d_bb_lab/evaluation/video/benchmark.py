@@ -3,21 +3,20 @@
 The camera does not move, and its pose is fitted to the floor. The videos have no stamps, so the rate of their images is
 nominal.
 """
+import functools
 import os
 import tempfile
 
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.detection.boxes import Detections
-from ros_3d_bb.detection.depth.detector import DepthPeople
-from ros_3d_bb.detection.depth.ground_plane import floor_from_transform
 from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import CameraView, detections_from_boxes
 from ros_3d_bb_lab.evaluation.baselines.norfair_baseline import Norfair
 from ros_3d_bb_lab.evaluation.defaults import ROOT, data_folder, default_weights, in_range
-from ros_3d_bb_lab.evaluation.detector_benchmark import DEPTH, open_networks
+from ros_3d_bb_lab.evaluation.detector_benchmark import ignoring_depth, open_networks
+from ros_3d_bb_lab.evaluation.detectors import weight_free_detectors
 from ros_3d_bb_lab.evaluation.scene_benchmark import boxes3d_of, view_of
 from ros_3d_bb_lab.evaluation.text_table import table_of
 from ros_3d_bb_lab.evaluation.video.pictures import write_picture
@@ -28,13 +27,6 @@ from ros_3d_bb_lab.evaluation.video.simulated_video import write_simulated_video
 MARKED = os.path.join(ROOT, 'test', 'data', 'video')  # truth of recorded videos
 START_NS = 100 * NS  # stamp of the first image
 OURS, NORFAIR = 'ours', 'norfair'
-NO_DETECTIONS = Detections(np.zeros((0, 4)), np.zeros(0), np.zeros(0, int))
-
-
-def depth_detector(video, pose):
-    """The detector without weights as a function of a colour and a depth image; it knows the floor below the camera."""
-    people, floor = DepthPeople(), floor_from_transform(np.linalg.inv(pose))
-    return lambda color, depth: people.detect(color, depth, video.camera, floor) or NO_DETECTIONS
 
 
 def track_video(video, pose, detect, rate_hz, trackers):
@@ -69,9 +61,10 @@ def run(arguments):
         video = read_video(data)
         truth = read_truth(arguments.truth or truth_path(data), video)
         pose, rate_hz = video.camera_pose(), arguments.rate or truth.rate_hz
-        detectors = {DEPTH: depth_detector(video, pose)}
+        detectors = {name: functools.partial(detect, camera_from_floor=np.linalg.inv(pose))
+                     for name, detect in weight_free_detectors(video.camera).items()}
         for name, network in open_networks(arguments.weights, arguments.confidence).items():
-            detectors[name] = lambda color, _depth, network=network: network.detect(color)
+            detectors[name] = ignoring_depth(network)
         result = {}
         for name, detect in detectors.items():
             pictures = arguments.pictures and os.path.join(arguments.pictures, name)
