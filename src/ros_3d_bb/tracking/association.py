@@ -11,6 +11,7 @@ from ros_3d_bb.tracking.kalman_filter import as_outlier, weighted
 from ros_3d_bb.tracking.track import (ARRIVAL_S, LEGS_M, MIN_TRACK_SCORE, SEEN, Track, log_odds_of,
                                       log_odds_of_arrival)
 
+UNSURE_SHARE = 0.1  # upper bound of the new-target density, relative to the peak density of the detection; chosen
 HEAD_SIGMAS = 2.0  # standard deviation of the head top relative to that of the height; chosen: the camera tilts
 # Cost of a box of another height: the person sits down, stands up or bends in 2 % of the images; and if the tops match
 # and the lower end is so much higher than the feet that the legs are hidden. Chosen: heights of people differ by less.
@@ -82,13 +83,14 @@ def _gate(measurement, new_target_density, outliers, evidence):
     above this cost from the distance `factor` * sqrt(tr P) + `reach` on, where P is the covariance of the position of
     the track.
 
-    The cost of a new target is -log of its density. The density of a Gaussian at the distance d of its mean is at most
-    exp(-d² / (2 tr S)) / (2 pi sqrt(det R)), where R is the noise and S = P + R the covariance of the innovation; the
-    square root of tr S is at most the sum of those of tr P and tr R. Outliers are nearer by their offset, and have a
-    larger R.
+    The cost of a new target is -log of its density; at least that of a measurement whose own noise makes every density
+    low: an uncertain detection fits a new target and a track about equally well, and the track takes precedence. The
+    density of a Gaussian at the distance d of its mean is at most exp(-d² / (2 tr S)) / (2 pi sqrt(det R)), where R
+    is the noise and S = P + R the covariance of the innovation; the square root of tr S is at most the sum of those of
+    tr P and tr R. Outliers are nearer by their offset, and have a larger R.
     """
     determinant = measurement.xx * measurement.yy - measurement.xy * measurement.xy
-    limit = evidence - math.log(new_target_density)
+    limit = evidence - math.log(min(new_target_density, UNSURE_SHARE / (2 * math.pi * math.sqrt(determinant))))
     factor = math.sqrt(max(2 * (limit - LOG_TWO_PI) - math.log(determinant), 0))
     reach = factor * math.sqrt(measurement.xx + measurement.yy + outliers.spread_m2) + outliers.offset_m
     return limit, factor, reach
