@@ -62,6 +62,7 @@ def allowed_costs(tracks, measurements, detection_log_odds, params, outliers):
     """
     evidence = evidence_of_pairs(tracks, measurements)
     most = (MOST_ALIKE if evidence else 0.0) + max(detection_log_odds, default=0.0)
+    new_cost = -math.log(params.new_target_density)
     gates = [_gate(measurement, params.new_target_density, outliers, most) for measurement in measurements]
     is_crowd = len(tracks) * len(measurements) >= CROWD
     pairs = (_likely_pairs_of_crowd if is_crowd else _likely_pairs)(tracks, measurements, gates, outliers)
@@ -69,8 +70,8 @@ def allowed_costs(tracks, measurements, detection_log_odds, params, outliers):
     for row, column, cost, is_nearer in pairs:
         track, measurement = tracks[row], measurements[column]
         cost += height_cost(track, measurement, params.height_sigma) - evidence.get((row, column), 0.0)
-        cost -= detection_log_odds[row]
         limit = gates[column][0] - most
+        cost -= max(detection_log_odds[row] - (limit - new_cost), 0.0)  # the limit of uncertain boxes is high enough
         if cost < limit and track.kind.group == measurement.kind.group:
             costs[row, column] = cost - limit
             if is_nearer:
