@@ -14,6 +14,7 @@ from ros_3d_bb.tracking.out_of_sequence import DetectedImage
 from ros_3d_bb.tracking.track import (ARRIVAL_S, LEGS_M, MIN_TRACK_SCORE, SEEN, Rules, Track, log_odds_of,
                                       log_odds_of_arrival)
 
+UNSURE_SHARE = 0.1  # upper bound of the new-target density, relative to the peak density of the detection; chosen
 HEAD_SIGMAS = 2.0  # standard deviation of the head top relative to that of the height; chosen: the camera tilts
 # Cost of a box of another height: the person sits down, stands up or bends in 2 % of the images; and if the tops match
 # and the lower end is so much higher than the feet that the legs are hidden. Chosen: heights of people differ by less.
@@ -70,6 +71,7 @@ def allowed_costs(tracks: Sequence[Track], measurements: Sequence[Measurement], 
     """
     evidence = evidence_of_pairs(tracks, measurements)
     most = (MOST_ALIKE if evidence else 0.0) + max(detection_log_odds, default=0.0)
+    new_cost = -math.log(params.new_target_density)
     gates = [_gate(measurement, params.new_target_density, outliers, most) for measurement in measurements]
     is_crowd = len(tracks) * len(measurements) >= CROWD
     pairs = (_likely_pairs_of_crowd if is_crowd else _likely_pairs)(tracks, measurements, gates, outliers)
@@ -77,8 +79,8 @@ def allowed_costs(tracks: Sequence[Track], measurements: Sequence[Measurement], 
     for row, column, cost, is_nearer in pairs:
         track, measurement = tracks[row], measurements[column]
         cost += height_cost(track, measurement, params.height_sigma) - evidence.get((row, column), 0.0)
-        cost -= detection_log_odds[row]
         limit = gates[column][0] - most
+        cost -= max(detection_log_odds[row] - (limit - new_cost), 0.0)  # the limit of uncertain boxes is high enough
         if cost < limit and track.kind.group == measurement.kind.group:
             costs[row, column] = cost - limit
             if is_nearer:
@@ -91,13 +93,14 @@ def _gate(measurement: Measurement, new_target_density: float, outliers: Outlier
     above this cost from the distance `factor` * sqrt(tr P) + `reach` on, where P is the covariance of the position of
     the track.
 
-    The cost of a new target is -log of its density. The density of a Gaussian at the distance d of its mean is at most
-    exp(-d² / (2 tr S)) / (2 pi sqrt(det R)), where R is the noise and S = P + R the covariance of the innovation; the
-    square root of tr S is at most the sum of those of tr P and tr R. Outliers are nearer by their offset, and have a
-    larger R.
+    The cost of a new target is -log of its density; at least that of a measurement whose own noise makes every density
+    low: an uncertain detection fits a new target and a track about equally well, and the track takes precedence. The
+    density of a Gaussian at the distance d of its mean is at most exp(-d² / (2 tr S)) / (2 pi sqrt(det R)), where R
+    is the noise and S = P + R the covariance of the innovation; the square root of tr S is at most the sum of those of
+    tr P and tr R. Outliers are nearer by their offset, and have a larger R.
     """
     determinant = measurement.xx * measurement.yy - measurement.xy * measurement.xy
-    limit = evidence - math.log(new_target_density)
+    limit = evidence - math.log(min(new_target_density, UNSURE_SHARE / (2 * math.pi * math.sqrt(determinant))))
     factor = math.sqrt(max(2 * (limit - LOG_TWO_PI) - math.log(determinant), 0))
     reach = factor * math.sqrt(measurement.xx + measurement.yy + outliers.spread_m2) + outliers.offset_m
     return limit, factor, reach
