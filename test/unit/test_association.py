@@ -72,4 +72,4 @@ def test_a_newcomer_does_not_push_a_person_to_the_track_of_another_one():
               for number, measurement, unseen_s in zip((1, 2), people_at(0.0, 0.4), (0.1, 0.3))]
     boxes = people_at(0.05, -0.3)
     assert set(allowed_costs(tracks, boxes, [0.0, 0.0], params, outliers)[0]) == {(0, 0), (0, 1), (1, 0)}
-    assert associate(tracks, boxes, [0.0, 0.0], params, outliers) == [(tracks[0], boxes[0])]
+    assert associate(tracks, boxes, [0.0, 0.0], 0, params, outliers) == [(tracks[0], boxes[0])]

@@ -199,13 +199,11 @@ def cut_by(cut, visible_height, bottom=0.0):
 
 
 def test_people_are_distinguished_by_their_heads_if_feet_are_truncated():
-    """A child and an adult, whose feet are truncated, change places while another person hides them."""
+    """A child's track is not matched with an adult at the same position, although the feet of both are truncated."""
     def swapped(time_s):
-        places = (0.3, -0.3) if time_s < 2 else (-0.3, 0.3)
-        return [] if 1 < time_s < 2 else [at(2, y, 1.7, 'bottom', position_m=np.array([2, y, height - 1.7 / 2]))
-                                          for y, height in zip(places, (1.1, 1.8))]
-    before, after = (play(Tracker(), 3, swapped)[image] for image in (29, -1))
-    assert ids(before) == ids(after) and before[0].position_m[2] == pytest.approx(after[0].position_m[2], abs=0.1)
+        height = 1.1 if time_s < 1 else 1.8
+        return [cut_by(['bottom'], 1.7, bottom=height - 1.7)]
+    assert ids(play(Tracker(), 2, swapped)[-1]) == [2]
 
 
 @pytest.mark.slow

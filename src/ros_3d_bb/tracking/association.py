@@ -14,14 +14,15 @@ from ros_3d_bb.tracking.out_of_sequence import DetectedImage
 from ros_3d_bb.tracking.track import (ARRIVAL_S, LEGS_M, MIN_TRACK_SCORE, SEEN, Rules, Track, log_odds_of,
                                       log_odds_of_arrival)
 
+RECENT_NS = 6 * NS // 10  # tracks matched less than this ago are associated before the others; chosen
 UNSURE_SHARE = 0.1  # upper bound of the new-target density, relative to the peak density of the detection; chosen
 HEAD_SIGMAS = 2.0  # standard deviation of the head top relative to that of the height; chosen: the camera tilts
-# Cost of a box of another height: the person sits down, stands up or bends in 2 % of the images; and if the tops match
-# and the lower end is so much higher than the feet that the legs are hidden. Chosen: heights of people differ by less.
-POSTURE_COST, HIDDEN_LEGS_COST = 4.0, 1.0
+# Cost of a box whose top matches but whose height does not, as its legs are occluded; and if its lower end is so much
+# higher than the feet that it is hardly another person. Chosen: heights of people differ by less.
+HIDDEN_FEET_COST, HIDDEN_LEGS_COST = 4.0, 1.0
 CROWD = 200  # pairs from which on arrays are faster than numbers; measured with `./run bench speed`
 # Of the birth of tracks. All are chosen; `./run bench tracking` and `./run bench scenes` show the effect of others.
-RECENTLY_MATCHED_NS = NS // 2  # tracks of one object were all matched less than this ago
+RECENTLY_MATCHED_NS = NS // 2  # no track starts near a track that was matched less than this ago
 STARTING_SUPPORT = 0.2  # minimum support of a detection that starts a track: most positions with less are wrong
 NEW_NS = 3 * NS // 2  # people pass each other later than that after they were first detected
 SAME_PERSON_M = 0.15  # two people who are both visible cannot be this close to each other
@@ -32,20 +33,30 @@ Gate = Tuple[float, float, float]  # see `_gate`
 
 
 def associate(tracks: Sequence[Track], measurements: Sequence[Measurement], detection_log_odds: Sequence[float],
-              params: Any, outliers: OutlierModel) -> List[Tuple[Track, Measurement]]:
-    """Assign measurements to tracks, given the log odds that each track is detected, and not missed.
+              stamp_ns: int, params: Any, outliers: OutlierModel) -> List[Tuple[Track, Measurement]]:
+    """Assign measurements to tracks in a cascade: recently matched, then missed, then tentative tracks.
 
     A pair is allowed only if it is more likely than that the measurement is of a new target and the track is missed
     (the gate), and both have the same group of classes. Of the allowed pairs, those are selected that explain all
-    measurements best, first of the confirmed tracks, with a new target where no pair is left. `params` are
-    `tracker.TrackerParams`, `outliers` their OutlierModel. Returns a list of (Track, Measurement).
+    measurements best, with a new target where no pair is left. `detection_log_odds` are those that each track is
+    detected, and not missed; `params` are `tracker.TrackerParams`, `outliers` their OutlierModel. Returns a list of
+    (Track, Measurement).
     """
+    matches = []
+    ranks: Dict[int, Costs] = {}
+    taken: Set[int] = set()
     costs, nearer = allowed_costs(tracks, measurements, detection_log_odds, params, outliers)
-    pairs = _assigned({pair: cost for pair, cost in costs.items() if tracks[pair[0]].is_confirmed})
-    taken = set(column for _row, column in pairs)
-    pairs += _assigned({pair: cost for pair, cost in costs.items()
-                        if not tracks[pair[0]].is_confirmed and pair[1] not in taken})
-    return [(tracks[row], measurements[column]._replace(is_nearer=(row, column) in nearer)) for row, column in pairs]
+    for pair, cost in costs.items():
+        track = tracks[pair[0]]
+        rank = int(stamp_ns - track.last_ns >= RECENT_NS) if track.is_confirmed else 2
+        ranks.setdefault(rank, {})[pair] = cost
+    for rank in sorted(ranks):
+        costs = {pair: cost for pair, cost in ranks[rank].items() if pair[1] not in taken} if taken else ranks[rank]
+        for row, column in costs if len(costs) == 1 else _assigned(costs):
+            track, measurement = tracks[row], measurements[column]
+            matches.append((track, measurement._replace(is_nearer=True) if (row, column) in nearer else measurement))
+            taken.add(column)
+    return matches
 
 
 def detection_log_odds_of(tracks: Sequence[Track], camera: str, period_s: Optional[float],
@@ -100,7 +111,7 @@ def _gate(measurement: Measurement, new_target_density: float, outliers: Outlier
     tr P and tr R. Outliers are nearer by their offset, and have a larger R.
     """
     determinant = measurement.xx * measurement.yy - measurement.xy * measurement.xy
-    limit = evidence - math.log(min(new_target_density, UNSURE_SHARE / (2 * math.pi * math.sqrt(determinant))))
+    limit = -math.log(min(new_target_density, UNSURE_SHARE / (2 * math.pi * math.sqrt(determinant)))) + evidence
     factor = math.sqrt(max(2 * (limit - LOG_TWO_PI) - math.log(determinant), 0))
     reach = factor * math.sqrt(measurement.xx + measurement.yy + outliers.spread_m2) + outliers.offset_m
     return limit, factor, reach
@@ -177,8 +188,9 @@ def height_cost(track: Track, measurement: Measurement, sigma_m: float) -> float
 
     The height is unknown if the image border truncates the box, or has truncated all previous boxes of the track, or
     one shortly before the latest, as detectors may draw the edge of a truncated person inside the image. The tops of
-    the heads are then compared if both are known; otherwise the cost is 0. The cost is at most `POSTURE_COST`, and
-    at most that of the tops plus `HIDDEN_LEGS_COST` where the legs are hidden.
+    the heads are then compared if both are known; otherwise the cost is 0. Where the height is known, the cost is at
+    most that of the tops plus `HIDDEN_FEET_COST` or `HIDDEN_LEGS_COST`, because furniture occludes only the lower part
+    of a body.
     """
     _left, is_top_cut, _right, is_bottom_cut = measurement.detection.truncated_edges
     if not track.upper.hits or is_top_cut or track.upper.was_cut(track.last_ns):
@@ -189,9 +201,9 @@ def height_cost(track: Track, measurement: Measurement, sigma_m: float) -> float
     higher_m = track.z_m + height_m / 2 - measurement.z - seen_m / 2
     top_cost = (higher_m / (HEAD_SIGMAS * sigma_m)) ** 2 / 2
     if not track.lower.hits or is_bottom_cut or track.lower.was_cut(track.last_ns):
-        return min(top_cost, POSTURE_COST)
-    cost = min(((height_m - seen_m) / sigma_m) ** 2 / 2, POSTURE_COST)
-    return min(cost, top_cost + HIDDEN_LEGS_COST) if abs(height_m - seen_m - higher_m) > LEGS_M else cost
+        return top_cost
+    hidden_cost = HIDDEN_LEGS_COST if abs(height_m - seen_m - higher_m) > LEGS_M else HIDDEN_FEET_COST
+    return min(((height_m - seen_m) / sigma_m) ** 2 / 2, top_cost + hidden_cost)
 
 
 def _assigned(costs: Costs) -> List[Pair]:
@@ -210,22 +222,29 @@ def _assigned(costs: Costs) -> List[Pair]:
     return [pair for pair in ((rows[row], columns[column]) for row, column in found) if pair in costs]
 
 
-def initiate(unmatched: Iterable[Measurement], image: DetectedImage, period_s: Optional[float], params: Any,
-             rules: Rules, assign_id: Callable[[int], int]) -> List[Track]:
+def initiate(tracks: Iterable[Track], unmatched: Iterable[Measurement], image: DetectedImage,
+             period_s: Optional[float], params: Any, rules: Rules, assign_id: Callable[[int], int]) -> List[Track]:
     """Start tracks from the unmatched measurements of an image, except those that are ignored, or have little support
-    or a low score. Returns the new tracks.
+    or a low score, and duplicate detections of recently matched or new tracks of the same group of classes. Returns the
+    new tracks.
 
     `period_s` is the time since the previous image of the camera, None for its first one. `params` are
     `tracker.TrackerParams`, `rules` the `track.Rules`; assign_id(number) returns the ID of the track that the detection
     of this number starts.
     """
     stamp_ns, camera, arrival_log_odds = image.stamp_ns, image.view.camera, log_odds_of_arrival(period_s)
-    new = []
+    new, occupied = [], [(track.state.x, track.state.y, track.kind.group) for track in tracks
+                         if stamp_ns - track.last_ns < RECENTLY_MATCHED_NS]
     for measurement in unmatched:
-        detection, log_odds = measurement.detection, log_odds_of(measurement.detection.score, rules.even_log_odds)
-        if log_odds > MIN_TRACK_SCORE and detection.support >= STARTING_SUPPORT and not detection.is_ignored:
+        detection, kind, x, y = measurement.detection, measurement.kind, measurement.x, measurement.y
+        log_odds = log_odds_of(detection.score, rules.even_log_odds)
+        is_duplicate = any(math.hypot(other_x - x, other_y - y) < params.duplicate_distance and group == kind.group
+                           for other_x, other_y, group in occupied)
+        is_excluded = is_duplicate or detection.is_ignored
+        if log_odds > MIN_TRACK_SCORE and detection.support >= STARTING_SUPPORT and not is_excluded:
+            occupied.append((x, y, kind.group))
             new.append(Track(assign_id(measurement.number), measurement, stamp_ns, camera,
-                             params.initial_speed * measurement.kind.known.initial_speed, log_odds + arrival_log_odds))
+                             params.initial_speed * kind.known.initial_speed, log_odds + arrival_log_odds))
     return new
 
 

@@ -1,4 +1,4 @@
-"""Sudden motions: people who start to run, turn or stop between two images, and leave the gate.
+"""Sudden motions: people who start to run, turn, stop or sit down between two images, and leave the gate.
 
 At low image rates, the filter expects such a person elsewhere. A track that was detected in the latest image and a box
 that is within reach of that detection belong together all the same, unless another track or box is within reach, too:
@@ -7,20 +7,23 @@ the association decides contested pairs by their likelihood.
 The reach is the distance that a person covers in the time between two images. It is measured from the latest box and
 not from the prediction, because the prediction overshoots where a person turns. A track without a box in the latest
 image has no such reach, because the person may be occluded, and the box that of another one. If it was detected just
-before, only a box on this side of its predicted place belongs to it, as of a person who stops or turns.
+before, only a box on this side of its predicted place belongs to it, as of a person who crouches, stops or turns.
 """
 import math
 from typing import Any, List, Sequence, Tuple
 
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.tracking.association import HIDDEN_FEET_COST, height_cost
 from ros_3d_bb.tracking.kalman_filter import faster
 from ros_3d_bb.tracking.measurement_model import Measurement
-from ros_3d_bb.tracking.track import HIT_CORRELATION_S, Track
+from ros_3d_bb.tracking.track import HIT_CORRELATION_S, LatestBox, Track
 
 # All are chosen; `./run bench tracking --rates` shows the effect of others.
 RUNNING_MPS = 6.0  # of new tracks, whose velocity is unknown: people run no faster indoors
 TURNING_MPS = 1.5  # beside the speed of the track: walking people start, stop and turn within this change of velocity
 BESIDE_M = 0.1  # difference of two boxes of a standing person
+RISING_MPS, MOST_RISE_M = 2.0, 0.5  # of heads: people who sit down, stand up or bend are slower, or do so for longer
+BESIDE_SIGMAS = 2.0  # difference of the heads of two boxes of a standing person, relative to `height_sigma`
 SETTLED_NS = NS // 2  # the velocity of a track is known this long after its first detection
 RECENT_NS = 4 * NS // 10  # a person who is missed for less may have stopped or turned
 STOPPED = 0.7  # share of the way to the predicted place that such a person has gone at most
@@ -28,8 +31,8 @@ LONGEST_NS = NS  # between two images; chosen: after longer, anyone may be withi
 
 
 def match_manoeuvres(tracks: Sequence[Track], measurements: Sequence[Measurement],
-                     matches: Sequence[Tuple[Track, Measurement]], latest_ns: int,
-                     stamp_ns: int) -> List[Tuple[Track, Measurement]]:
+                     matches: Sequence[Tuple[Track, Measurement]], latest_ns: int, stamp_ns: int,
+                     height_sigma_m: float) -> List[Tuple[Track, Measurement]]:
     """The pairs (Track, Measurement) outside of the gate that have no other candidates.
 
     `matches` are those of the association, `latest_ns` is the stamp of the latest image of the camera. The velocities
@@ -43,7 +46,7 @@ def match_manoeuvres(tracks: Sequence[Track], measurements: Sequence[Measurement
     taken = set(measurement.number for _track, measurement in matches)
 
     def is_within_reach(track: Track, measurement: Measurement) -> bool:
-        return _is_within_reach(track, measurement, stamp_ns, track.last_ns >= latest_ns)
+        return _is_within_reach(track, measurement, stamp_ns, track.last_ns >= latest_ns, height_sigma_m)
 
     pairs = []
     for track in seen:
@@ -64,15 +67,22 @@ def match_manoeuvres(tracks: Sequence[Track], measurements: Sequence[Measurement
     return pairs
 
 
-def _is_within_reach(track: Track, measurement: Measurement, stamp_ns: int, may_move: bool) -> bool:
+def _is_within_reach(track: Track, measurement: Measurement, stamp_ns: int, may_move: bool,
+                     height_sigma_m: float) -> bool:
     """Whether the object of a track, which stops or turns unless it `may_move` on, may be at a measurement."""
     if track.kind.group != measurement.kind.group:
         return False
-    elapsed_s, walking_mps = (stamp_ns - track.last_ns) / NS, math.hypot(track.state.u, track.state.v)
-    is_new = stamp_ns - track.first_ns < SETTLED_NS
-    speed_mps = (RUNNING_MPS if is_new else walking_mps + TURNING_MPS) if may_move else STOPPED * walking_mps
-    is_similar = is_new or track.is_confirmed
-    return is_similar and _distance_m(track.latest, measurement) < speed_mps * elapsed_s + BESIDE_M
+    elapsed_s, box = (stamp_ns - track.last_ns) / NS, LatestBox.of(measurement)
+    walking_mps = math.hypot(track.state.u, track.state.v)
+    if stamp_ns - track.first_ns < SETTLED_NS:
+        moving_mps = RUNNING_MPS
+        is_similar = height_cost(track, measurement, height_sigma_m) < HIDDEN_FEET_COST
+    else:
+        moving_mps = walking_mps + TURNING_MPS
+        rise_m = min(RISING_MPS * elapsed_s, MOST_RISE_M) + BESIDE_SIGMAS * height_sigma_m
+        is_similar = track.is_confirmed and abs(box.head_m - track.latest.head_m) < rise_m
+    speed_mps = moving_mps if may_move else STOPPED * walking_mps
+    return is_similar and _distance_m(track.latest, box) < speed_mps * elapsed_s + BESIDE_M
 
 
 def _distance_m(place: Any, box: Any) -> float:

@@ -23,6 +23,7 @@ USUAL_PERIOD_S = 1 / 30.0  # image period assumed for the first image of a camer
 # last 0.5 s, count as if they lasted 0.15 s, as before their duration was measured.
 NOISE_DENSITY = 0.08 * 0.3273 ** 4
 PART_M = 0.3  # a narrower truncated box shows only a part of the body's width; chosen: less than the usual 0.5 m
+MAX_SHIFT_M = 0.2  # chosen: less than half of the usual width
 CUT_SIGMA_M = 0.08  # additional lateral standard deviation of truncated or partly occluded boxes; chosen
 NEAR_M = 0.01  # the viewing ray of a closer box is undefined; the optical axis is used instead
 TOUCHING_RAD = 0.03  # a nearer box occludes another one if the gap between them is smaller than this; chosen
@@ -163,7 +164,7 @@ def _measurement(detection: Detection, number: int, side: int, kind: Kind, direc
         along, across = noise.unknown_scale * along, noise.unknown_scale * across
     if cut_left or cut_right:
         side = int(cut_left) - int(cut_right) if size_m[0] < PART_M else 0
-    shift_m = side * max((kind.known.width + WIDER_M - size_m[0]) / 2, 0.0)
+    shift_m = side * min(max((kind.known.width + WIDER_M - size_m[0]) / 2, 0.0), MAX_SHIFT_M)
     return Measurement(
         x - shift_m * ray_y, y + shift_m * ray_x, z, along * ray_x * ray_x + across * ray_y * ray_y,
         (along - across) * ray_x * ray_y, along * ray_y * ray_y + across * ray_x * ray_x, float(zz), is_assumed, size_m,

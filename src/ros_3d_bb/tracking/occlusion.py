@@ -16,7 +16,8 @@ from ros_3d_bb.tracking.track import PRESENT, SEEN, STAYED
 from ros_3d_bb.tracking.types import NEARER_M, OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView, wrapped
 
 # All are chosen; `./run bench scenes` and `./run bench tracking` show the effect of others.
-NEAREST_M = 0.45  # people this close to the camera are not detected reliably
+EDGE_RAD = 0.04  # people this close to the image border are not detected reliably
+NEAREST_M = 0.45  # neither are people this close to the camera
 BLIND_M = 1.0  # most depth cameras measure nothing nearer than 0.3 to 0.8 m; the axis of a body is behind its surface
 LEAST_IN_IMAGE = 0.2  # minimum share of the body axis inside the image for a person to be detected
 RELIABLE_IN_IMAGE = 0.5  # detectors often fail if less of the body axis is in the image
@@ -268,7 +269,8 @@ def _out_of_range(view, positions_m, sizes_m, distances_m, max_range_m):
 
 
 def _shares_in_image(view, positions_m, heights_m, bearings):
-    """Share (n,) of the axes of upright bodies inside the part of the image with depth, regardless of occlusion.
+    """Share (n,) of the axes of upright bodies inside the part of the image with depth, less a margin of `EDGE_RAD`,
+    regardless of occlusion.
 
     Points for which the lens distortion defines no pixel count as outside. Without intrinsics, the image shows
     everything ahead.
@@ -284,7 +286,8 @@ def _shares_in_image(view, positions_m, heights_m, bearings):
         pixels = camera.project(points)
         area_px = view.measured_area() if view.measured_area else (0, 0) + camera[:2]
         low_px, high_px = np.reshape(area_px, (2, 2)) - 0.5
-        inside = ((pixels >= low_px) & (pixels <= high_px)).all(axis=-1)
+        margin_px = np.multiply(EDGE_RAD, (camera.fx, camera.fy))
+        inside = ((pixels >= low_px + margin_px) & (pixels <= high_px - margin_px)).all(axis=-1)
     return (in_front & inside).sum(axis=1) / len(AXIS_SAMPLES)
 
 

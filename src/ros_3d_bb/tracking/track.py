@@ -25,6 +25,7 @@ from ros_3d_bb.tracking.types import NOT_DETECTED, OUT_OF_VIEW, VISIBLE, Tracked
 HIT_CORRELATION_S = 0.08  # without scores, three images at 30 Hz or two independent ones confirm a track by default
 CONFIRMING_NS = 6 * NS // 100  # detections of less time than three images at 30 Hz confirm no track
 ARRIVAL_S = 1.0  # people in the first image of a camera have arrived before: during this time, as after longer gaps
+OUTLIER_CORRELATION_S = 0.2  # boxes of the same kind, such as outliers, follow each other; chosen
 LEAST_MISPLACED = -5.0  # of the log odds that outliers have moved a track: earlier boxes are forgotten; chosen
 MISS_CORRELATION_S = 0.15  # the causes of misses, such as poses and partial occlusion, last longer
 UNKNOWN_SCORE, LARGEST_SCORE = 0.5, 0.9999  # assumed if the score is unknown; upper bound, for its log odds
@@ -36,7 +37,7 @@ MAX_TRACK_SCORE = 4.0  # earlier evidence is forgotten: an undetected person is 
 MIN_TRACK_SCORE = -2.0  # with less (12 % probability), tracks do not start, and undetected tracks are not published
 SMOOTHING = 0.1  # weight of the newest detection in size, height and score
 SMOOTHED_HITS = 10  # number of detections from which on their mean has this weight
-HIDDEN_SMOOTHING = 0.02  # the same for a lower end that does not show the legs
+CUT_SMOOTHING = 0.02  # the same for boxes that the image border truncates sideways: the head may be outside
 LEGS_M = 0.2  # a lower end that is this much higher does not show the legs; chosen: heights of people differ by less
 CUT_LASTS_NS = NS // 2  # hysteresis: an end is visible again this long after it was last truncated
 LEAST_HEIGHT_M = 0.1
@@ -121,15 +122,18 @@ class _End(NamedTuple):
 
 
 class LatestBox(NamedTuple):
-    """Position of the latest detection."""
+    """Position of the latest detection, and the height of its upper end, or of the image border that truncates it;
+    whether it was nearer than the track by the offset of outliers."""
 
     x: float
     y: float
+    head_m: float
+    is_nearer: bool
 
     @classmethod
     def of(cls, measurement):
         """The LatestBox of a Measurement."""
-        return cls(measurement.x, measurement.y)
+        return cls(measurement.x, measurement.y, measurement.z + measurement.size_m[2] / 2, measurement.is_nearer)
 
 
 class Track(object):
@@ -188,8 +192,8 @@ class Track(object):
         self.set_visibility(camera, SEEN, stamp_ns)
         elapsed_s = (stamp_ns - self.last_ns) / NS
         period_s, share = elapsed_s - self.unseen_s, max(1 - math.exp(-elapsed_s / SLOW_S), 1 / self.hits)
-        self.latest = LatestBox.of(measurement)
-        measurement = self._in_place(measurement, rules.outliers)
+        latest, self.latest = self.latest, LatestBox.of(measurement)
+        measurement = self._in_place(measurement, latest, period_s, rules.outliers)
         detection, state = measurement.detection, self.state
         is_assumed = measurement.is_assumed
         self.innovation_m = (measurement.x - state.x, measurement.y - state.y) if is_assumed else (0.0, 0.0)
@@ -210,24 +214,28 @@ class Track(object):
         self._update_class(measurement.kind, detection.score, rules.kinds)
         self._update_appearance(detection)
 
-    def _in_place(self, measurement, outliers):
+    def _in_place(self, measurement, latest, period_s, outliers):
         """Resolve a measurement that is nearer than this track by the offset of outliers. Returns the one to use.
 
         If outliers have probably moved this track, it is moved back. Otherwise the box is wrong, and the measurement is
         moved to the track; always if several cameras have it in view, whose boxes differ where their poses are wrong.
         Other measurements are returned as they are.
 
-        The log odds `misplaced` add up the log-likelihood ratios of the boxes.
+        The log odds `misplaced` add up the log-likelihood ratios of the boxes. One of another kind than the `latest`
+        counts fully, others by the time `period_s` since then, because errors of boxes last.
         """
-        if not measurement.is_nearer:
-            self.misplaced = max(self.misplaced + outliers.log_outliers - outliers.log_inliers, LEAST_MISPLACED)
+        is_nearer = measurement.is_nearer
+        share = min(period_s / OUTLIER_CORRELATION_S, 1) if is_nearer == latest.is_nearer else 1
+        if not is_nearer:
+            self.misplaced = max(self.misplaced + share * (outliers.log_outliers - outliers.log_inliers),
+                                 LEAST_MISPLACED)
             return measurement
-        self.misplaced += outliers.log_inliers - outliers.log_nearer
+        self.misplaced += share * (outliers.log_inliers - outliers.log_nearer)
         cameras = sum(seen != OUT_OF_VIEW for seen in self.visibility.values())
         if self.misplaced < 0 or cameras > 1:
             return kalman_filter.moved_back(measurement, -measurement.ray_x, -measurement.ray_y, outliers)
         self.state = kalman_filter.moved_back(self.state, measurement.ray_x, measurement.ray_y, outliers)
-        self.misplaced = LEAST_MISPLACED
+        self.misplaced, self.latest = LEAST_MISPLACED, self.latest._replace(is_nearer=False)
         return measurement
 
     def miss(self, status, unseen_s, missed_s, detection_probability):
@@ -249,17 +257,19 @@ class Track(object):
         place the edge of a truncated person on either side of the limit of truncation, so an end stays truncated for
         `CUT_LASTS_NS`.
         """
-        _left, top, _right, bottom = measurement.detection.truncated_edges
+        cut_left, top, cut_right, bottom = measurement.detection.truncated_edges
         self.lower, is_lower_held = _end_after(self.lower, bottom, stamp_ns)
         self.upper, is_upper_held = _end_after(self.upper, top, stamp_ns)
-        share = max(SMOOTHING, 1 / self.hits)
-        lower_share = 0.0 if is_lower_held else max(SMOOTHING, 1 / (self.lower.hits or self.hits))
-        upper_share = 0.0 if is_upper_held else max(SMOOTHING, 1 / (self.upper.hits or self.hits))
+        share, largest = max(SMOOTHING, 1 / self.hits), 1.0
+        if cut_left or cut_right:
+            share = largest = CUT_SMOOTHING
+        lower_share = 0.0 if is_lower_held else min(max(SMOOTHING, 1 / (self.lower.hits or self.hits)), largest)
+        upper_share = 0.0 if is_upper_held else min(max(SMOOTHING, 1 / (self.upper.hits or self.hits)), largest)
         (width_m, depth_m, height_m), (new_width_m, new_depth_m, new_height_m) = self.size_m, measurement.size_m
         up_m, taller_m = measurement.z - self.z_m, new_height_m - height_m
         lower_up_m, upper_up_m = up_m - taller_m / 2, up_m + taller_m / 2
         if not is_lower_held and self.lower.hits > 1 and abs(upper_up_m) < LEGS_M < lower_up_m:
-            lower_share = HIDDEN_SMOOTHING
+            lower_share = CUT_SMOOTHING
         lower_m, upper_m = lower_share * lower_up_m, upper_share * upper_up_m
         if is_lower_held:
             lower_m = upper_m

@@ -54,6 +54,8 @@ class TrackerParams(NamedTuple):
     new_target_density: float = Param(
         0.14, 'Density of new targets and false detections. A box that no track explains better than this starts a '
         'new track.', '1/m^2', limits=(1e-9, LARGEST), live=(0.001, 1), section=ASSOCIATION)
+    duplicate_distance: float = Param(
+        0.35, 'No track starts closer than this to a recently matched one.', 'm', live=(0, 1), section=ASSOCIATION)
     height_sigma: float = Param(
         0.085, 'Standard deviation of the difference between the heights of a box and of the track of its person.',
         'm', limits=(1e-6, LARGEST), live=(0.02, 0.5), section=ASSOCIATION)
@@ -177,9 +179,10 @@ class Tracker(object):
         tracks = self._predict(before, image.stamp_ns)
         measurements = self._measure(before, image, period_s)
         log_odds = detection_log_odds_of(tracks, image.view.camera, period_s, self._detector.detection_probability)
-        matches = associate(tracks, measurements, log_odds, self._params[0], self._rules.outliers)
+        matches = associate(tracks, measurements, log_odds, image.stamp_ns, self._params[0], self._rules.outliers)
         if len(matches) < len(measurements) and latest:
-            matches += match_manoeuvres(tracks, measurements, matches, latest.stamp_ns, image.stamp_ns)
+            matches += match_manoeuvres(tracks, measurements, matches, latest.stamp_ns, image.stamp_ns,
+                                        self._params[0].height_sigma)
         matched = {track.id: (track.is_confirmed, measurement.number) for track, measurement in matches}
         log_noise_scale = learned_log_scale(before.log_noise_scale, matches)
         self._update_matched(matches, log_noise_scale - max(before.log_noise_scale, 0), image)
@@ -197,7 +200,7 @@ class Tracker(object):
         if len(matches) < len(measurements):
             taken = set(number for _is_confirmed, number in matched.values())
             unmatched = [measurement for measurement in measurements if measurement.number not in taken]
-            tracks += initiate(unmatched, image, period_s, self._params[0], self._rules, assign_id)
+            tracks += initiate(tracks, unmatched, image, period_s, self._params[0], self._rules, assign_id)
         untracked_boxes = before.untracked_boxes + sum(track.hits for track in deleted if not track.is_confirmed)
         state = _State(tracks, image.stamp_ns, cameras, log_noise_scale, untracked_boxes, departed)
         return state, [(track_id,) + match for track_id, match in matched.items()]
