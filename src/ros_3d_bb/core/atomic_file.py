@@ -2,9 +2,9 @@
 import contextlib
 import errno
 import os
+import secrets
 import signal
 import sys
-import tempfile
 from typing import Iterator
 
 
@@ -24,33 +24,37 @@ def replacement_of(path: str, prefix: str = '.', suffix: str = '.tmp') -> Iterat
 
     Raises OSError before the block if `path` cannot be written.
     """
-    temporary = _new_file_beside(path, prefix, suffix)
-    try:
+    temporary = _name_beside(path, prefix, suffix)
+    try:  # from before the file exists: a signal may raise an exception at any time
+        _create(temporary, path)
         yield temporary
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(temporary, 0o666 & ~mask)  # mkstemp permits only the owner to read it
         os.replace(temporary, path)
     except BaseException:
-        with contextlib.suppress(FileNotFoundError):
+        with contextlib.suppress(OSError):  # it may not exist
             os.unlink(temporary)
         raise
 
 
 def check_writable(path: str) -> None:
     """Raise OSError if a file cannot be written to `path`. For commands that run long before they write."""
-    os.unlink(_new_file_beside(path, '.', '.tmp'))
+    temporary = _name_beside(path, '.', '.tmp')
+    _create(temporary, path)
+    os.unlink(temporary)
 
 
-def _new_file_beside(path: str, prefix: str, suffix: str) -> str:
+def _name_beside(path: str, prefix: str, suffix: str) -> str:
+    """A name in the folder of `path` that no file has: 64 random bits."""
+    return os.path.join(os.path.dirname(path), prefix + secrets.token_hex(8) + suffix)
+
+
+def _create(temporary: str, path: str) -> None:
+    """Create a file beside `path`, with the usual permissions. Raises OSError about `path`."""
     if os.path.isdir(path):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), path)
     try:
-        descriptor, name = tempfile.mkstemp(dir=os.path.dirname(path), prefix=prefix, suffix=suffix)
+        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
     except OSError as error:
         raise type(error)(error.errno, error.strerror, path)
-    os.close(descriptor)
-    return name
 
 
 def clean_up_on_sigterm() -> None:
