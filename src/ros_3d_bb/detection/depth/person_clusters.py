@@ -117,11 +117,17 @@ def _ends(valid):
     return sides, valid.argmax(axis=0), len(valid) - 1 - valid[::-1].argmax(axis=0)
 
 
-@functools.lru_cache(maxsize=8)  # takes longer than the rest, and the floor seldom changes
+@functools.lru_cache(maxsize=8)  # undistortion takes longer than the rest
+def _camera_rays(camera, step):
+    """Viewing rays of the cells of a grid, as `Camera.rays`."""
+    return camera.rays(np.arange(step // 2, camera.width, step), np.arange(step // 2, camera.height, step)[:, None])
+
+
+@functools.lru_cache(maxsize=8)  # a floor that is known from tf seldom changes
 def _rays(camera, step, *normal):
     """Viewing rays (3, rows, columns) of the cells of a grid: to the right, ahead and up, given the normal of the
     floor."""
-    x, y = camera.rays(np.arange(step // 2, camera.width, step), np.arange(step // 2, camera.height, step)[:, None])
+    x, y = _camera_rays(camera, step)
     ahead = np.array([0, 0, 1]) - normal[2] * np.array(normal)
     ahead /= np.linalg.norm(ahead)
     return np.stack([np.float32(axis[0] * x + axis[1] * y + axis[2])
