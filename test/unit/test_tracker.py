@@ -7,7 +7,7 @@ from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.measurement_model import NoiseParams
 from ros_3d_bb.tracking.occlusion import depths_towards
-from ros_3d_bb.tracking.track import PredictionParams
+from ros_3d_bb.tracking.prediction import PredictionParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
 from support.people import CAMERA, START_NS, VIEW, all_ids, at, ids, noisy, play, standing, view_from

@@ -1,4 +1,4 @@
-"""Tracks: the state of one object from image to image, and what is published of it.
+"""Tracks: the state of one object from image to image.
 
 The track score is the log odds that a track is an object and not a series of false detections: the sum of the
 log-likelihood ratios of its detections and misses (Sittler 1964; Blackman and Popoli, Design and Analysis of Modern
@@ -9,17 +9,13 @@ rates, the score depends on the time and not on the number of images.
 A track starts with the log odds of its first detection and of an arrival: the number of people who come into view
 between two images grows with the time between them, the number of independent false detections of an image does not.
 """
-import functools
 import math
 from typing import NamedTuple
 
-import numpy as np
-
-from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking import kalman_filter
 from ros_3d_bb.tracking.appearance import LEAST_SUPPORT, Appearance
-from ros_3d_bb.tracking.types import NOT_DETECTED, OUT_OF_VIEW, VISIBLE, TrackedObject, prediction_times_s
+from ros_3d_bb.tracking.types import NOT_DETECTED, OUT_OF_VIEW, VISIBLE
 
 # All are chosen; `./run bench tracking` and `./run bench scenes` show the effect of others.
 HIT_CORRELATION_S = 0.08  # without scores, three images at 30 Hz or two independent ones confirm a track by default
@@ -43,54 +39,10 @@ CUT_LASTS_NS = NS // 2  # hysteresis: an end is visible again this long after it
 LEAST_HEIGHT_M = 0.1
 STILL_MOVING = 0.5  # hysteresis: a moving track stops below this share of `moving_speed`
 NEVER_NS = -10 ** 18
+SLOW_S = 0.3  # time constant of the slow velocity, from which the velocity differs in manoeuvres; see `prediction`
 # Visibility of a detected track, and of one that is not detected, but whose place is occupied in the depth image:
 # STAYED if by something that is farther than the axis of the body. They rank before VISIBLE, OCCLUDED and OUT_OF_VIEW.
 SEEN, PRESENT, STAYED = -3, -2, -1
-LEAST_SPEED2 = 1e-12  # avoids a division by zero
-# Prediction. Chosen for recorded pedestrians by kind of motion; `./run bench prediction` shows the effect of others.
-SLOW_S = 0.3  # time constant of the slow velocity, from which the velocity differs in manoeuvres
-SLOW_SHARE = 0.4  # of the slow velocity in that of the prediction: people sway as they walk
-MANOEUVRE = 2.0  # squared ratio of this difference to the standard deviation at which a manoeuvre has the weight 1/2
-# People who walk accelerate less than those who start: density relative to that at rest, and the squared speed at which
-# it is halfway between.
-WALKING_SHARE, WALKING_M2PS2 = 1 / 3.0, 0.36
-# Places among the numbers of a published track, see `_numbers_of`: of x, y, z, their velocities, the velocity of the
-# prediction, the extents, and the share of `manoeuvre_acceleration`; of the covariance of the first six, and of the two
-# terms of the covariances of x, y, z that are multiplied by the powers 0, 1, 2 of the time of a prediction.
-POSITION, VELOCITY, EXPECTED, SIZE, MANOEUVRING = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), 12
-XX, XY, XU, XV, YY, YU, YV, UU, UV, VV, ZZ = range(13, 24)
-ZERO = 5  # the vertical velocity
-COVARIANCE = np.array([[XX, XY, ZERO, XU, XV, ZERO], [XY, YY, ZERO, YU, YV, ZERO], [ZERO, ZERO, ZZ, ZERO, ZERO, ZERO],
-                       [XU, YU, ZERO, UU, UV, ZERO], [XV, YV, ZERO, UV, VV, ZERO], [ZERO] * 6])
-_CROSS, _NOTHING = COVARIANCE[:3, 3:], np.full((3, 3), ZERO)
-AHEAD = COVARIANCE[:3, :3], _CROSS, COVARIANCE[3:, 3:], _NOTHING, _CROSS.T, _NOTHING
-COVARIANCES = np.concatenate([COVARIANCE.ravel()] + [each.ravel() for each in AHEAD])  # at once, as indexing is slow
-LEVEL = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])  # a covariance (3, 3) of 1 along x and y
-
-
-@parameters('predictions')
-class PredictionParams(NamedTuple):
-    """Parameters of the prediction of tracks."""
-
-    prediction_time: float = Param(2.0, 'How far ahead positions are predicted; 2 in the thesis.', 's', live=(0, 10))
-    prediction_step: float = Param(0.25, 'Time between predicted positions.', 's', live=(0.05, 1))
-    prediction_acceleration: float = Param(
-        0.02, 'How much more people turn than the filter models: density of a white acceleration.', 'm^2/s^3',
-        live=(0, 1))
-    manoeuvre_acceleration: float = Param(
-        0.45, 'Additional density of a white acceleration of people who start. People who stop or turn while they walk '
-        'have a third of it.',
-        'm^2/s^3', live=(0, 2))
-    standing_speed: float = Param(
-        0.15, 'A velocity much lower than this is not extrapolated: it is mostly noise.', 'm/s', live=(0, 1))
-    position_bias: float = Param(
-        0.05, 'Standard deviation added for errors that stay the same for seconds.', 'm', live=(0, 0.5))
-    pose_sigma: float = Param(
-        0.0, 'Standard deviation of the position of the robot in the frame of the tracks, along each axis, such as the '
-        'error of its localisation. It is added to the covariances.', 'm', live=(0, 1))
-    pose_yaw_sigma: float = Param(
-        0.0, 'Standard deviation of the heading of the robot in the frame of the tracks. It is added to the '
-        'covariances.', 'rad', live=(0, 0.5))
 
 
 class Rules(NamedTuple):
@@ -332,76 +284,3 @@ def log_odds_of_arrival(period_s):
 
 def _logit(probability):
     return math.log(probability / (1 - probability))
-
-
-def learned_prediction(log_scale, assumed_m, params):
-    """Adapt PredictionParams to the learned scale of the variance `assumed_m`².
-
-    If the scale is below 1, the rest of the variance is that of lasting errors, and slow velocities are less noisy.
-    """
-    if log_scale >= 0:
-        return params
-    scale = math.exp(log_scale)
-    lasting_m = math.sqrt(max(params.position_bias ** 2, assumed_m ** 2 * (1 - scale)))
-    return params._replace(position_bias=lasting_m, standing_speed=params.standing_speed * math.sqrt(scale))
-
-
-def published(tracks, params, moving_speed, camera_m):
-    """Convert tracks to a list of TrackedObject with predictions at constant velocity; `params` are PredictionParams.
-
-    A track that was moving when it was last detected may have been stopped since, see `occlusion.mark_missed`.
-
-    People sway as they walk. The predicted velocity v is therefore between that of the filter and the slow one. A low
-    velocity is mostly noise of a standing person, so v is scaled by v² / (v² + standing_speed²). The covariance of the
-    filter does not include errors that stay constant for seconds, such as those of a wrong calibration; `position_bias`
-    is added for them, and the error of the robot's pose: `pose_sigma`, and `pose_yaw_sigma` about the position (2,) of
-    the camera, `camera_m`. A prediction is a mixture of two Gaussians with the same mean: the person goes on, with
-    `prediction_acceleration`, or is in a manoeuvre, with `manoeuvre_acceleration` in addition. The covariance is that
-    of the mixture.
-    """
-    if not tracks:
-        return []
-    numbers = np.array([_numbers_of(track, params.standing_speed ** 2 + LEAST_SPEED2) for track in tracks])
-    numbers[:, [XX, YY]] += params.position_bias ** 2 + params.pose_sigma ** 2
-    across = (numbers[:, :2] - camera_m)[:, ::-1] * (-params.pose_yaw_sigma, params.pose_yaw_sigma)
-    numbers[:, [XX, XY, YY]] += across[:, (0, 0, 1)] * across[:, (0, 1, 1)]
-    times_s, powers, spread = _times(params.prediction_time, params.prediction_step)
-    densities = params.prediction_acceleration + params.manoeuvre_acceleration * numbers[:, MANOEUVRING]
-    positions_m, velocities_mps, sizes_m = numbers[:, POSITION], numbers[:, VELOCITY], numbers[:, SIZE]
-    predictions_m = positions_m[:, None] + times_s[:, None] * numbers[:, None, EXPECTED]
-    covariances = numbers.take(COVARIANCES, axis=1)
-    ahead = (covariances[:, 36:63] + covariances[:, 63:]).reshape(-1, 3, 9)
-    predictions_m2 = powers @ ahead + densities[:, None, None] * spread
-    return [TrackedObject(track.id, position_m, size_m, velocity_mps, velocity_mps, track.status,
-                          track.is_moving and math.hypot(track.state.u, track.state.v) >= STILL_MOVING * moving_speed,
-                          track.first_ns, track.last_ns, prediction_m, params.prediction_step, covariance,
-                          prediction_m2, track.kind.label, track.score, track.detection)
-            for track, position_m, size_m, velocity_mps, prediction_m, covariance, prediction_m2
-            in zip(tracks, positions_m, sizes_m, velocities_mps, predictions_m,
-                   covariances[:, :36].reshape(-1, 6, 6),
-                   predictions_m2.reshape(len(tracks), -1, 3, 3))]
-
-
-def _numbers_of(track, standing2):
-    """The numbers of a track that are published, in the order of `POSITION` and the others below it.
-
-    A person is in a manoeuvre if the velocity differs from the slow one by more than its covariance explains.
-    """
-    state, (slow_u, slow_v) = track.state, track.slow_mps
-    change_u, change_v = slow_u - state.u, slow_v - state.v
-    u, v = state.u + SLOW_SHARE * change_u, state.v + SLOW_SHARE * change_v
-    speed2, change2 = u * u + v * v, change_u ** 2 + change_v ** 2
-    share = speed2 / (speed2 + standing2)
-    manoeuvring = change2 / (change2 + MANOEUVRE * (state.uu + state.vv) / 2 + LEAST_SPEED2)  # its probability
-    manoeuvring *= WALKING_SHARE + (1 - WALKING_SHARE) * WALKING_M2PS2 / (WALKING_M2PS2 + speed2)
-    x, y, vx, vy, *variances = state
-    return (x, y, track.z_m, vx, vy, 0.0, share * u, share * v, 0.0, *track.size_m, manoeuvring, *variances, track.z_m2)
-
-
-@functools.lru_cache(maxsize=16)
-def _times(time_s, step_s):
-    """Times of the predictions (steps,), their powers 0 to 2 (steps, 3), and the variances (steps, 9) that a white
-    acceleration of density 1 adds.
-    """
-    times_s = prediction_times_s(time_s, step_s)
-    return (times_s, np.stack((times_s ** 0, times_s, times_s ** 2), axis=1), (times_s ** 3 / 3)[:, None] * LEVEL)

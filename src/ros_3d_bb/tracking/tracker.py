@@ -23,8 +23,8 @@ from ros_3d_bb.tracking.measurement_model import (BOX_ERRORS, DEFAULT_RANGE_M, B
                                                   measurements_of, scaled)
 from ros_3d_bb.tracking.occlusion import CameraState, contradicting_cameras, mark_missed
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, Match, OutOfSequenceBuffer
-from ros_3d_bb.tracking.track import (MIN_TRACK_SCORE, PredictionParams, Rules, Track, learned_prediction,
-                                      published)
+from ros_3d_bb.tracking.prediction import PredictionParams, learned_prediction, published
+from ros_3d_bb.tracking.track import MIN_TRACK_SCORE, Rules, Track
 from ros_3d_bb.tracking.types import VISIBLE, CameraView, Detection, TrackedObject, check_steps
 
 KNOWN_NS = 60 * NS  # a camera without images for longer than this, while others send images, counts as new; chosen
