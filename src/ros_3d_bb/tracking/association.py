@@ -193,14 +193,14 @@ def height_cost(track: Track, measurement: Measurement, sigma_m: float) -> float
     of a body.
     """
     _left, is_top_cut, _right, is_bottom_cut = measurement.detection.truncated_edges
-    if not track.upper.hits or is_top_cut or track.upper.was_cut(track.last_ns):
+    if not track.upper_hits or is_top_cut:
         return 0.0
     height_m, seen_m = track.size_m[2], measurement.size_m[2]
     if track.is_confirmed:
         sigma_m *= math.sqrt(1 + 1 / track.hits)  # error of the mean of its boxes; other tracks may be of false boxes
     higher_m = track.z_m + height_m / 2 - measurement.z - seen_m / 2
     top_cost = (higher_m / (HEAD_SIGMAS * sigma_m)) ** 2 / 2
-    if not track.lower.hits or is_bottom_cut or track.lower.was_cut(track.last_ns):
+    if not track.lower_hits or is_bottom_cut:
         return top_cost
     hidden_cost = HIDDEN_LEGS_COST if abs(height_m - seen_m - higher_m) > LEGS_M else HIDDEN_FEET_COST
     return min(((height_m - seen_m) / sigma_m) ** 2 / 2, top_cost + hidden_cost)

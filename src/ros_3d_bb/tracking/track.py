@@ -32,13 +32,9 @@ KNOWN_IMAGES = 4  # images that the expected rate of detections counts for, agai
 MAX_TRACK_SCORE = 4.0  # earlier evidence is forgotten: an undetected person is published for 0.4 s
 MIN_TRACK_SCORE = -2.0  # with less (12 % probability), tracks do not start, and undetected tracks are not published
 SMOOTHING = 0.1  # weight of the newest detection in size, height and score
-SMOOTHED_HITS = 10  # number of detections from which on their mean has this weight
-CUT_SMOOTHING = 0.02  # the same for boxes that the image border truncates sideways: the head may be outside
 LEGS_M = 0.2  # a lower end that is this much higher does not show the legs; chosen: heights of people differ by less
-CUT_LASTS_NS = NS // 2  # hysteresis: an end is visible again this long after it was last truncated
 LEAST_HEIGHT_M = 0.1
 STILL_MOVING = 0.5  # hysteresis: a moving track stops below this share of `moving_speed`
-NEVER_NS = -10 ** 18
 SLOW_S = 0.3  # time constant of the slow velocity, from which the velocity differs in manoeuvres; see `prediction`
 # Visibility of a detected track, and of one that is not detected, but whose place is occupied in the depth image:
 # STAYED if by something that is farther than the axis of the body. They rank before VISIBLE, OCCLUDED and OUT_OF_VIEW.
@@ -61,18 +57,6 @@ class Rules(NamedTuple):
                    _logit(params.confirmation_probability), params.moving_speed, kinds)
 
 
-class _End(NamedTuple):
-    """Lower or upper end of a body: number of the detections that show it, and stamp of the latest that is truncated.
-    """
-
-    hits: int
-    cut_ns: int
-
-    def was_cut(self, stamp_ns):
-        """Whether this end was truncated within `CUT_LASTS_NS` before a stamp."""
-        return stamp_ns - self.cut_ns < CUT_LASTS_NS
-
-
 class LatestBox(NamedTuple):
     """Position of the latest detection, and the height of its upper end, or of the image border that truncates it;
     whether it was nearer than the track by the offset of outliers."""
@@ -92,7 +76,7 @@ class Track(object):
     """One object. Plain numbers in the fixed frame, metres, nanoseconds.
 
     `state` is a `kalman_filter.State`. `z_m` is the height of the centre and `z_m2` its variance; `size_m` are the
-    extents, and `lower` and `upper` the ends of the body. `hits` counts the detections, of which `first_ns` and
+    extents; `lower_hits` and `upper_hits` count the detections that show the ends of the body. `hits` counts the detections, of which `first_ns` and
     `last_ns` are the first and the latest. `unseen_s` is the time since the latest one, `missed_s` the part of it
     during which a detection was expected. `visibility` is that in the latest image of each camera: SEEN, PRESENT,
     STAYED, or as `status`; since the stamps `since_ns`. `latest` is the `LatestBox`, `misses` counts the images before
@@ -114,7 +98,7 @@ class Track(object):
                                          0.0, measurement.yy, 0.0, 0.0, speed_m2, 0.0, speed_m2)
         self.z_m, self.z_m2, self.size_m = measurement.z, measurement.zz, measurement.size_m
         _left, top, _right, bottom = detection.truncated_edges
-        self.lower, self.upper = (_End(0, stamp_ns) if is_cut else _End(1, NEVER_NS) for is_cut in (bottom, top))
+        self.lower_hits, self.upper_hits = int(not bottom), int(not top)
         self.latest, self.misses = LatestBox.of(measurement), 0
         self.hits, self.first_ns, self.last_ns, self.unseen_s, self.missed_s = 1, stamp_ns, stamp_ns, 0.0, 0.0
         self.status, self.innovation_m = VISIBLE, (0.0, 0.0)
@@ -162,7 +146,7 @@ class Track(object):
         self.status, self.detection = VISIBLE, detection.index
         limit_mps = rules.moving_speed * (STILL_MOVING if self.is_moving else 1)
         self.is_moving = math.hypot(state.u, state.v) >= limit_mps
-        self._update_size(measurement, stamp_ns)
+        self._update_size(measurement)
         self._update_class(measurement.kind, detection.score, rules.kinds)
         self._update_appearance(detection)
 
@@ -201,31 +185,26 @@ class Track(object):
         self.log_odds += min(missed_s / MISS_CORRELATION_S, 1) * math.log(1 - detection_probability)
         self.innovation_m = 0.0, 0.0
 
-    def _update_size(self, measurement, stamp_ns):
+    def _update_size(self, measurement):
         """Smooth the extents and the height.
 
-        The lower and the upper end are smoothed separately. A truncated end moves with the other one, so that the
-        height stays constant. An end that has never been visible is placed where the estimator expects it. Detectors
-        place the edge of a truncated person on either side of the limit of truncation, so an end stays truncated for
-        `CUT_LASTS_NS`.
+        The lower and the upper end are smoothed separately. An end that is truncated moves with the other one, so that
+        the height stays constant, as does a lower end that is hidden: much higher than before, below the same head. An
+        end that has never been visible is placed where the estimator expects it.
         """
-        cut_left, top, cut_right, bottom = measurement.detection.truncated_edges
-        self.lower, is_lower_held = _end_after(self.lower, bottom, stamp_ns)
-        self.upper, is_upper_held = _end_after(self.upper, top, stamp_ns)
-        share, largest = max(SMOOTHING, 1 / self.hits), 1.0
-        if cut_left or cut_right:
-            share = largest = CUT_SMOOTHING
-        lower_share = 0.0 if is_lower_held else min(max(SMOOTHING, 1 / (self.lower.hits or self.hits)), largest)
-        upper_share = 0.0 if is_upper_held else min(max(SMOOTHING, 1 / (self.upper.hits or self.hits)), largest)
+        _left, is_top_cut, _right, is_bottom_cut = measurement.detection.truncated_edges
         (width_m, depth_m, height_m), (new_width_m, new_depth_m, new_height_m) = self.size_m, measurement.size_m
         up_m, taller_m = measurement.z - self.z_m, new_height_m - height_m
-        lower_up_m, upper_up_m = up_m - taller_m / 2, up_m + taller_m / 2
-        if not is_lower_held and self.lower.hits > 1 and abs(upper_up_m) < LEGS_M < lower_up_m:
-            lower_share = CUT_SMOOTHING
-        lower_m, upper_m = lower_share * lower_up_m, upper_share * upper_up_m
-        if is_lower_held:
+        lower_m, upper_m = up_m - taller_m / 2, up_m + taller_m / 2
+        is_hidden = is_bottom_cut or abs(upper_m) < LEGS_M < lower_m
+        self.lower_hits, self.upper_hits = self.lower_hits + (not is_hidden), self.upper_hits + (not is_top_cut)
+        share = max(SMOOTHING, 1 / self.hits)
+        lower_share = max(SMOOTHING, 1 / (self.lower_hits or self.hits))
+        upper_share = max(SMOOTHING, 1 / (self.upper_hits or self.hits))
+        lower_m, upper_m = lower_share * lower_m, upper_share * upper_m
+        if is_hidden and (self.lower_hits or not is_bottom_cut):
             lower_m = upper_m
-        if is_upper_held:
+        if is_top_cut and self.upper_hits:
             upper_m = lower_m
         self.size_m = (width_m + share * (new_width_m - width_m), depth_m + share * (new_depth_m - depth_m),
                        max(height_m + upper_m - lower_m, LEAST_HEIGHT_M))
@@ -248,16 +227,6 @@ class Track(object):
             votes = {label: (1 - share) * vote for label, vote in self.votes.items()}
             votes[kind.label] = votes.get(kind.label, 0.0) + share * _vote(score)
             self.votes, self.kind = votes, kinds[max(kind.members, key=lambda label: votes.get(label, 0.0))]
-
-
-def _end_after(end, is_cut, stamp_ns):
-    """The _End after a detection, and whether it moves with the other one."""
-    if not is_cut and end.hits >= SMOOTHED_HITS and not end.was_cut(stamp_ns):
-        return end, False  # further detections make no difference
-    cut_ns = stamp_ns if is_cut else end.cut_ns
-    was_cut = not is_cut and end.was_cut(stamp_ns)
-    hits = end.hits + (not is_cut and not was_cut)
-    return _End(hits, cut_ns), was_cut or is_cut and hits > 0
 
 
 def _vote(score):
