@@ -10,12 +10,13 @@ A track starts with the log odds of its first detection and of an arrival: the n
 between two images grows with the time between them, the number of independent false detections of an image does not.
 """
 import math
-from typing import NamedTuple
+from typing import Any, FrozenSet, NamedTuple, Optional
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking import kalman_filter
 from ros_3d_bb.tracking.appearance import LEAST_SUPPORT, Appearance
-from ros_3d_bb.tracking.types import NOT_DETECTED, OUT_OF_VIEW, VISIBLE
+from ros_3d_bb.tracking.measurement_model import Kind, Kinds, Measurement
+from ros_3d_bb.tracking.types import NOT_DETECTED, OUT_OF_VIEW, VISIBLE, Detection
 
 # All are chosen; `./run bench tracking` and `./run bench scenes` show the effect of others.
 HIT_CORRELATION_S = 0.08  # without scores, three images at 30 Hz or two independent ones confirm a track by default
@@ -48,10 +49,10 @@ class Rules(NamedTuple):
     even_log_odds: float
     confirming_log_odds: float
     moving_speed: float
-    kinds: dict
+    kinds: Kinds
 
     @classmethod
-    def of(cls, params, kinds):
+    def of(cls, params: Any, kinds: Kinds) -> 'Rules':
         """The Rules of TrackerParams."""
         return cls(kalman_filter.outlier_model(params), _logit(params.even_score),
                    _logit(params.confirmation_probability), params.moving_speed, kinds)
@@ -67,7 +68,7 @@ class LatestBox(NamedTuple):
     is_nearer: bool
 
     @classmethod
-    def of(cls, measurement):
+    def of(cls, measurement: Measurement) -> 'LatestBox':
         """The LatestBox of a Measurement."""
         return cls(measurement.x, measurement.y, measurement.z + measurement.size_m[2] / 2, measurement.is_nearer)
 
@@ -76,19 +77,21 @@ class Track(object):
     """One object. Plain numbers in the fixed frame, metres, nanoseconds.
 
     `state` is a `kalman_filter.State`. `z_m` is the height of the centre and `z_m2` its variance; `size_m` are the
-    extents; `lower_hits` and `upper_hits` count the detections that show the ends of the body. `hits` counts the detections, of which `first_ns` and
-    `last_ns` are the first and the latest. `unseen_s` is the time since the latest one, `missed_s` the part of it
-    during which a detection was expected. `visibility` is that in the latest image of each camera: SEEN, PRESENT,
-    STAYED, or as `status`; since the stamps `since_ns`. `latest` is the `LatestBox`, `misses` counts the images before
-    the confirmation in which a detection was expected. `log_odds` is the track score. `kind` is the class of the group
-    that has the most of the filtered scores `votes`; `score` is the filtered score of the detections, `detection` the
-    `Detection.index` in the latest image. `innovation_m` is that of the latest image if its noise is assumed, otherwise
-    0. `slow_mps` is the velocity, filtered over `SLOW_S`. `misplaced` are the log odds that outliers have moved this
-    track. `is_moving` is whether it moved at the latest detection. `appearance` is the `Appearance`, None if unknown,
-    and `met` are the IDs of the tracks that were detected in an image together with this one.
+    extents; `lower_hits` and `upper_hits` count the detections that show the ends of the body. `hits` counts the
+    detections, of which `first_ns` and `last_ns` are the first and the latest. `unseen_s` is the time since the latest
+    one, `missed_s` the part of it during which a detection was expected. `visibility` is that in the latest image of
+    each camera: SEEN, PRESENT, STAYED, or as `status`; since the stamps `since_ns`. `latest` is the `LatestBox`,
+    `misses` counts the images before the confirmation in which a detection was expected. `log_odds` is the track score.
+    `kind` is the class of the group that has the most of the filtered scores `votes`; `score` is the filtered score of
+    the detections, `detection` the `Detection.index` in the latest image. `innovation_m` is that of the latest image if
+    its noise is assumed, otherwise 0. `slow_mps` is the velocity, filtered over `SLOW_S`. `misplaced` are the log odds
+    that outliers have moved this track. `is_moving` is whether it moved at the latest detection. `appearance` is the
+    `Appearance`, None if unknown, and `met` are the IDs of the tracks that were detected in an image together with this
+    one.
     """
 
-    def __init__(self, track_id, measurement, stamp_ns, camera, speed_mps, log_odds):
+    def __init__(self, track_id: int, measurement: Measurement, stamp_ns: int, camera: str, speed_mps: float,
+                 log_odds: float) -> None:
         """Start a track with a track score; the velocity is unknown, with the standard deviation `speed_mps` along each
         axis.
         """
@@ -106,10 +109,11 @@ class Track(object):
         self.slow_mps, self.misplaced = (0.0, 0.0), 0.0
         self.log_odds, self.is_confirmed, self.is_moving = log_odds, False, False
         self.votes = {measurement.kind.label: _vote(detection.score)}
-        self.appearance, self.met = None, frozenset()
+        self.appearance: Optional[Appearance] = None
+        self.met: FrozenSet[int] = frozenset()
         self._update_appearance(detection)
 
-    def predicted(self, elapsed_s, acceleration):
+    def predicted(self, elapsed_s: float, acceleration: float) -> 'Track':
         """A copy of this track `elapsed_s` later, not detected, given the acceleration density of people."""
         track = Track.__new__(Track)
         track.__dict__.update(self.__dict__)
@@ -117,13 +121,13 @@ class Track(object):
         track.detection = NOT_DETECTED
         return track
 
-    def set_visibility(self, camera, visibility, stamp_ns):
+    def set_visibility(self, camera: str, visibility: int, stamp_ns: int) -> None:
         """Set the visibility in the latest image of a camera. Copies of this track keep the previous one."""
         if self.visibility.get(camera) != visibility:
             self.visibility, self.since_ns = dict(self.visibility), dict(self.since_ns)
             self.visibility[camera], self.since_ns[camera] = visibility, stamp_ns
 
-    def update(self, measurement, stamp_ns, camera, rules):
+    def update(self, measurement: Measurement, stamp_ns: int, camera: str, rules: Rules) -> None:
         """Update this track, predicted to the stamp, with its measurement in the image of a camera."""
         self.set_visibility(camera, SEEN, stamp_ns)
         elapsed_s = (stamp_ns - self.last_ns) / NS
@@ -150,7 +154,8 @@ class Track(object):
         self._update_class(measurement.kind, detection.score, rules.kinds)
         self._update_appearance(detection)
 
-    def _in_place(self, measurement, latest, period_s, outliers):
+    def _in_place(self, measurement: Measurement, latest: LatestBox, period_s: float,
+                  outliers: kalman_filter.OutlierModel) -> Measurement:
         """Resolve a measurement that is nearer than this track by the offset of outliers. Returns the one to use.
 
         If outliers have probably moved this track, it is moved back. Otherwise the box is wrong, and the measurement is
@@ -174,7 +179,7 @@ class Track(object):
         self.misplaced, self.latest = LEAST_MISPLACED, self.latest._replace(is_nearer=False)
         return measurement
 
-    def miss(self, status, unseen_s, missed_s, detection_probability):
+    def miss(self, status: int, unseen_s: float, missed_s: float, detection_probability: float) -> None:
         """Mark this track as not detected for `unseen_s` and not detected where a camera should for `missed_s`."""
         self.status, self.unseen_s, self.missed_s = status, self.unseen_s + unseen_s, self.missed_s + missed_s
         if not self.is_confirmed and missed_s:
@@ -185,7 +190,7 @@ class Track(object):
         self.log_odds += min(missed_s / MISS_CORRELATION_S, 1) * math.log(1 - detection_probability)
         self.innovation_m = 0.0, 0.0
 
-    def _update_size(self, measurement):
+    def _update_size(self, measurement: Measurement) -> None:
         """Smooth the extents and the height.
 
         The lower and the upper end are smoothed separately. An end that is truncated moves with the other one, so that
@@ -211,12 +216,12 @@ class Track(object):
         self.z_m += (lower_m + upper_m) / 2
         self.z_m2 += (lower_share + upper_share) / 2 * (measurement.zz - self.z_m2)
 
-    def _update_appearance(self, detection):
+    def _update_appearance(self, detection: Detection) -> None:
         """Average the colours of the clothes."""
         if detection.appearance is not None and detection.support >= LEAST_SUPPORT:
             self.appearance = (self.appearance or Appearance()).updated(detection.appearance)
 
-    def _update_class(self, kind, score, kinds):
+    def _update_class(self, kind: Kind, score: float, kinds: Kinds) -> None:
         """Filter the score, and those of the classes of the group: the mean of the first detections, then a first-order
         filter. Unknown scores leave the score as it is.
         """
@@ -229,12 +234,12 @@ class Track(object):
             self.votes, self.kind = votes, kinds[max(kind.members, key=lambda label: votes.get(label, 0.0))]
 
 
-def _vote(score):
+def _vote(score: float) -> float:
     """Weight of a detection for the class of its track: its score, 1 if unknown."""
     return score if score > 0 else 1.0
 
 
-def log_odds_of(score, even_log_odds):
+def log_odds_of(score: float, even_log_odds: float) -> float:
     """Log odds that a detection shows an object: its score is 0..1, 0 if unknown; half of the detections with the score
     of the log odds `even_log_odds` do.
     """
@@ -242,7 +247,7 @@ def log_odds_of(score, even_log_odds):
     return min(log_odds, MAX_LOG_ODDS)
 
 
-def log_odds_of_arrival(period_s):
+def log_odds_of_arrival(period_s: Optional[float]) -> float:
     """Log odds that a new detection shows a person who has come into view in the time `period_s` since the previous
     image of the camera, None for its first one, relative to those after `HIT_CORRELATION_S`. After less, new false
     detections are rarer, too, as those of the previous image repeat.
@@ -251,5 +256,5 @@ def log_odds_of_arrival(period_s):
     return math.log(arrival_s / HIT_CORRELATION_S)
 
 
-def _logit(probability):
+def _logit(probability: float) -> float:
     return math.log(probability / (1 - probability))
