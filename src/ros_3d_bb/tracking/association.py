@@ -186,11 +186,10 @@ def _likely_pairs_of_crowd(tracks: Sequence[Track], measurements: Sequence[Measu
 def height_cost(track: Track, measurement: Measurement, sigma_m: float) -> float:
     """Association cost of the height difference: its negative log likelihood, 0 for the same height.
 
-    The height is unknown if the image border truncates the box, or has truncated all previous boxes of the track, or
-    one shortly before the latest, as detectors may draw the edge of a truncated person inside the image. The tops of
-    the heads are then compared if both are known; otherwise the cost is 0. Where the height is known, the cost is at
-    most that of the tops plus `HIDDEN_FEET_COST` or `HIDDEN_LEGS_COST`, because furniture occludes only the lower part
-    of a body.
+    The height is unknown if the image border truncates the box, or has truncated all previous boxes of the track. The
+    tops of the heads are then compared if both are known; otherwise the cost is 0. Where the height is known, the cost
+    is at most that of the tops plus `HIDDEN_FEET_COST` or `HIDDEN_LEGS_COST`, because furniture occludes only the lower
+    part of a body.
     """
     _left, is_top_cut, _right, is_bottom_cut = measurement.detection.truncated_edges
     if not track.upper_hits or is_top_cut:

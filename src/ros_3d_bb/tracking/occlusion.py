@@ -42,7 +42,6 @@ BEHIND_M = 0.45  # upper bound of the position's standard deviation of a person 
 PRESENT_M = 0.3  # the same of one whose place is occupied
 STOPPING_S = 0.5  # time constant of the velocity of a person who does not come as near as predicted
 PRESENT_NS = 30 * NS  # without a detection for longer, what occupies the place may be a wall, which never leaves
-OCCLUDING_S = 0.3  # a track missed for longer does not occlude others
 # Distance of the tracks of one person in two places, and time for which each is missed by one camera; chosen.
 CONTRADICTING_M, CONTRADICTING_NS = 1.5, 5 * NS
 Visibilities = Dict[int, int]  # by track ID
@@ -76,7 +75,7 @@ def mark_missed(missed: Sequence[Track], tracks: Iterable[Track], before: Iterab
     which accounts for `observed_s` seconds. `detection_probability` is that of a visible person.
     """
     former = {track.id: track for track in before}
-    occluding = [track for track in tracks if track.is_confirmed and track.missed_s < OCCLUDING_S]
+    occluding = [track for track in tracks if track.is_confirmed]
     image, others = cameras[camera], recent_others(cameras, camera, cameras[camera].stamp_ns)
     seen, staying = _seen_and_staying(missed, former, occluding, image, others)
     views, decay = [image.view] + [other.view for other in others.values()], math.exp(-observed_s / STOPPING_S)

@@ -29,7 +29,6 @@ UNKNOWN_SCORE, LARGEST_SCORE = 0.5, 0.9999  # assumed if the score is unknown; u
 # Of the score of a detection. A high score does not mean that the position is right, as of a person half hidden.
 MAX_LOG_ODDS = 1.1
 HIT = 0.8  # of a detection where a track is expected: little, because false detections repeat at their place, too
-KNOWN_IMAGES = 4  # images that the expected rate of detections counts for, against the observed rate of a new track
 MAX_TRACK_SCORE = 4.0  # earlier evidence is forgotten: an undetected person is published for 0.4 s
 MIN_TRACK_SCORE = -2.0  # with less (12 % probability), tracks do not start, and undetected tracks are not published
 SMOOTHING = 0.1  # weight of the newest detection in size, height and score
@@ -81,13 +80,12 @@ class Track(object):
     detections, of which `first_ns` and `last_ns` are the first and the latest. `unseen_s` is the time since the latest
     one, `missed_s` the part of it during which a detection was expected. `visibility` is that in the latest image of
     each camera: SEEN, PRESENT, STAYED, or as `status`; since the stamps `since_ns`. `latest` is the `LatestBox`,
-    `misses` counts the images before the confirmation in which a detection was expected. `log_odds` is the track score.
-    `kind` is the class of the group that has the most of the filtered scores `votes`; `score` is the filtered score of
-    the detections, `detection` the `Detection.index` in the latest image. `innovation_m` is that of the latest image if
-    its noise is assumed, otherwise 0. `slow_mps` is the velocity, filtered over `SLOW_S`. `misplaced` are the log odds
-    that outliers have moved this track. `is_moving` is whether it moved at the latest detection. `appearance` is the
-    `Appearance`, None if unknown, and `met` are the IDs of the tracks that were detected in an image together with this
-    one.
+    `log_odds` is the track score. `kind` is the class of the group that has the most of the filtered scores `votes`;
+    `score` is the filtered score of the detections, `detection` the `Detection.index` in the latest image.
+    `innovation_m` is that of the latest image if its noise is assumed, otherwise 0. `slow_mps` is the velocity,
+    filtered over `SLOW_S`. `misplaced` are the log odds that outliers have moved this track. `is_moving` is whether it
+    moved at the latest detection. `appearance` is the `Appearance`, None if unknown, and `met` are the IDs of the
+    tracks that were detected in an image together with this one.
     """
 
     def __init__(self, track_id: int, measurement: Measurement, stamp_ns: int, camera: str, speed_mps: float,
@@ -102,7 +100,7 @@ class Track(object):
         self.z_m, self.z_m2, self.size_m = measurement.z, measurement.zz, measurement.size_m
         _left, top, _right, bottom = detection.truncated_edges
         self.lower_hits, self.upper_hits = int(not bottom), int(not top)
-        self.latest, self.misses = LatestBox.of(measurement), 0
+        self.latest = LatestBox.of(measurement)
         self.hits, self.first_ns, self.last_ns, self.unseen_s, self.missed_s = 1, stamp_ns, stamp_ns, 0.0, 0.0
         self.status, self.innovation_m = VISIBLE, (0.0, 0.0)
         self.visibility, self.since_ns = {camera: SEEN}, {camera: stamp_ns}
@@ -182,22 +180,19 @@ class Track(object):
     def miss(self, status: int, unseen_s: float, missed_s: float, detection_probability: float) -> None:
         """Mark this track as not detected for `unseen_s` and not detected where a camera should for `missed_s`."""
         self.status, self.unseen_s, self.missed_s = status, self.unseen_s + unseen_s, self.missed_s + missed_s
-        if not self.is_confirmed and missed_s:
-            # Some people are detected in half of the images only, but again and again at the same place: the mean of
-            # the expected rate, which counts as `KNOWN_IMAGES`, and of the observed one.
-            self.misses += 1
-            detection_probability *= (self.hits + KNOWN_IMAGES) / (self.hits + self.misses + KNOWN_IMAGES)
         self.log_odds += min(missed_s / MISS_CORRELATION_S, 1) * math.log(1 - detection_probability)
         self.innovation_m = 0.0, 0.0
 
     def _update_size(self, measurement: Measurement) -> None:
-        """Smooth the extents and the height.
+        """Smooth the extents and the height, unless the box shows only a part of the width, whose ends may be others.
 
         The lower and the upper end are smoothed separately. An end that is truncated moves with the other one, so that
         the height stays constant, as does a lower end that is hidden: much higher than before, below the same head. An
         end that has never been visible is placed where the estimator expects it.
         """
-        _left, is_top_cut, _right, is_bottom_cut = measurement.detection.truncated_edges
+        is_left_cut, is_top_cut, is_right_cut, is_bottom_cut = measurement.detection.truncated_edges
+        if is_left_cut or is_right_cut:
+            return
         (width_m, depth_m, height_m), (new_width_m, new_depth_m, new_height_m) = self.size_m, measurement.size_m
         up_m, taller_m = measurement.z - self.z_m, new_height_m - height_m
         lower_m, upper_m = up_m - taller_m / 2, up_m + taller_m / 2
