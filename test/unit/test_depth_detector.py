@@ -5,16 +5,13 @@ import pytest
 from conftest import DATA
 from ros_3d_bb.camera.camera_model import Camera, transform_points
 from ros_3d_bb.camera.images import DepthImage, mounted_camera
-from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.depth.detector import DepthPeople
 from ros_3d_bb.detection.depth.ground_plane import Floor, floor_from_transform
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
-from ros_3d_bb.tracking.tracker import Tracker
-from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb_lab.evaluation.defaults import scenario_path
-from ros_3d_bb_lab.evaluation.scene_benchmark import detector_in, track_frame
+from ros_3d_bb_lab.evaluation.scene_benchmark import detector_in
 from ros_3d_bb_lab.simulation.scenario import read_scenario, scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
 
@@ -173,33 +170,6 @@ def test_a_person_who_crouches_stays_detected():
         x_m, _y_m, z_m = transform_points(np.linalg.inv(frame.poses.map_from_camera), (5.0, -2.2, 0.6))
         column = simulator.camera.cx + simulator.camera.fx * x_m / z_m
         assert any(left < column < right for left, _top, right, _bottom in detect(frame).boxes.tolist()), number
-
-
-@pytest.mark.slow
-def test_a_person_whom_someone_passes_stays_detected():
-    simulator = Simulator(scenario_from({'duration': 3.0, 'rate': 10.0, 'seed': 3, 'people': [
-        {'start': [3.6, 0.0], 'facing': 3.1, 'moves': [{'wait': 10.0}]},
-        {'start': [2.4, 1.2], 'moves': [{'wait': 0.5}, {'to': [2.4, -1.2], 'speed': 0.8}]}]}))
-    detect, least_visible = detector_in(simulator, 'depth'), 1.0
-    for number in range(10, simulator.frame_count):
-        frame = simulator.frame(number)
-        standing = frame.people[0]
-        least_visible = min(least_visible, standing.visible)
-        assert iou(np.array(standing.box_px, float), detect(frame).boxes).max() > 0.3, (number, standing.visible)
-    assert least_visible < 0.35
-
-
-@pytest.mark.slow
-def test_a_person_half_a_metre_from_a_camera_stays_at_the_place():
-    """Only a part at the border of the image is far enough for the depth camera."""
-    simulator = Simulator(read_scenario(scenario_path('approach_high_mount')))
-    detect, tracker = detector_in(simulator, 'depth'), Tracker()
-    for number in range(80, 160, 2):
-        frame = simulator.frame(number)
-        tracks = track_frame(tracker, frame, detect(frame), int(frame.time_s * NS), simulator.camera, None)
-    person = frame.people[0]
-    assert [track.id for track in tracks] == [1]
-    assert np.linalg.norm(tracks[0].position_m[:2] - person.position_m[:2]) < 0.2 and tracks[0].status == VISIBLE
 
 
 @pytest.mark.slow

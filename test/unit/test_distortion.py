@@ -2,7 +2,6 @@ import operator
 
 import cv2
 import numpy as np
-import pyrealsense2
 import pytest
 from hypothesis import given, strategies as st
 
@@ -18,8 +17,6 @@ LENSES = [(55, PLUMB_BOB, (0.16, -0.5, -0.001, 0.0006, 0.47)),
           (55, INVERSE_BROWN_CONRADY, (0.16, -0.5, -0.001, 0.0006, 0.47)),
           (120, EQUIDISTANT, (-0.0022, 0.0376, -0.0364, 0.0059)), (120, EQUIDISTANT, (0, 0, 0, 0))]
 SIZES = [(640, 480), (1280, 720)]
-REALSENSE = {PLUMB_BOB: pyrealsense2.distortion.brown_conrady, EQUIDISTANT: pyrealsense2.distortion.kannala_brandt4,
-             INVERSE_BROWN_CONRADY: pyrealsense2.distortion.inverse_brown_conrady}
 
 
 def camera_of(lens, size):
@@ -31,7 +28,6 @@ def camera_of(lens, size):
 
 CAMERAS = [camera_of(lens, size) for size in SIZES for lens in LENSES]
 FOR_OPENCV = [camera for camera in CAMERAS if camera.distortion_model != INVERSE_BROWN_CONRADY]
-FOR_REALSENSE = [camera for camera in CAMERAS if camera.distortion_model in REALSENSE]
 
 
 def named(camera):
@@ -61,23 +57,6 @@ def test_equals_opencv(camera):
         back, _jacobian = cv2.projectPoints(points[:, None], np.zeros(3), np.zeros(3), matrix, lens)
     assert np.abs((rays[:, 0] - points[:, :2]) * camera[2:4]).max() < 1e-6
     assert np.abs(back[:, 0] - pixels).max() < 1e-6
-
-
-@pytest.mark.parametrize('camera', FOR_REALSENSE, ids=named)
-def test_equals_librealsense(camera):
-    """To the rounding of its single precision: 0.002 pixels."""
-    intrinsics = pyrealsense2.intrinsics()
-    intrinsics.width, intrinsics.height, intrinsics.fx, intrinsics.fy, intrinsics.ppx, intrinsics.ppy = camera[:6]
-    intrinsics.model = REALSENSE[camera.distortion_model]
-    intrinsics.coeffs = (list(camera.distortion) + [0.0])[:5]
-    pixels = every_pixel(camera, 29)
-    points = camera.deproject(pixels, 1.0)
-    assert np.abs(camera.project(points) - pixels).max() < 1e-6
-    back = [pyrealsense2.rs2_project_point_to_pixel(intrinsics, point) for point in points.tolist()]
-    np.testing.assert_allclose(back, pixels, atol=0.002)
-    expected = np.array([pyrealsense2.rs2_deproject_pixel_to_point(intrinsics, pixel, 1.0)
-                         for pixel in pixels.tolist()])
-    np.testing.assert_allclose((points - expected)[:, :2] * camera[2:4], 0, atol=0.002)
 
 
 @pytest.mark.parametrize('camera', CAMERAS, ids=named)

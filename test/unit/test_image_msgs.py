@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.conversions.image_msgs import LAYOUTS, array_from, fill_image, imgmsg_to_depth, imgmsg_to_rgb
+from ros_3d_bb.conversions.image_msgs import LAYOUTS, array_from, imgmsg_to_depth, imgmsg_to_rgb
 
 IMAGES = st.builds(SimpleNamespace, width=st.integers(0, 2 ** 32 - 1) | st.integers(0, 9),
                    height=st.integers(0, 2 ** 32 - 1) | st.integers(0, 9),
@@ -79,14 +79,3 @@ def test_an_image_is_readable_or_rejected(message):
             continue
         assert pixels.shape[:2] == (message.height, message.width)
         pixels.sum()  # each of them can be read
-
-
-@given(st.sampled_from(sorted(LAYOUTS)), st.integers(1, 9), st.integers(1, 9), st.integers(0, 255))
-def test_pixels_survive_an_image_message_and_missing_bytes_are_rejected(encoding, height, width, value):
-    kind, channels = LAYOUTS[encoding]
-    pixels = np.full((width, height) + ((channels,) if channels > 1 else ()), value, kind).swapaxes(0, 1)
-    message = fill_image(SimpleNamespace(), pixels, encoding)
-    np.testing.assert_array_equal(array_from(message), pixels)
-    message.data = message.data[:-1]
-    with pytest.raises(ValueError, match='too short'):
-        array_from(message)

@@ -5,7 +5,7 @@ import pytest
 
 from ros_3d_bb.camera.alignment import EdgeComparison
 from ros_3d_bb.camera.camera_model import Camera, transform_from
-from ros_3d_bb.camera.images import DepthImage, turned_depth
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.camera.registration import RegisteredDepth, Registration
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb_lab.simulation.scenario import scenario_from
@@ -65,15 +65,6 @@ def test_a_rotated_distorted_depth_camera_sees_the_same_points():
     expected_m = offset_m / pinhole.deproject(pixels, 1.0).dot(normal)
     assert (part > 0).mean() > 0.95
     assert np.abs(part - expected_m)[part > 0].max() < 0.02  # the slope of the wall within a pixel
-
-
-def test_the_area_with_depth_is_turned_with_the_image():
-    """The depth camera sees less than the colour camera: people at the border of the area are truncated."""
-    depth = registered(stripe(), COLOR, 0.02, Camera(160, 120, 160.0, 160.0, 79.5, 59.5))
-    left, top, right, bottom = depth.measured_area()
-    assert 0 < left != 640 - right > 0
-    assert turned_depth(depth, 1).measured_area() == (480 - bottom, left, 480 - top, right)
-    assert turned_depth(depth, 2).measured_area() == (640 - right, 480 - bottom, 640 - left, 480 - top)
 
 
 WALKING = [{'start': [3.0, -1.0], 'moves': [{'to': [3.5, 1.0]}]}]

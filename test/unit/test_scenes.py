@@ -126,16 +126,3 @@ def test_a_robot_that_drives_up_to_a_person_keeps_the_track(seed):
     for step in steps[5:]:
         track, = step.moment.tracks
         assert plane_distances([step.frame.people[0].position_m], [track.position_m]) < 0.3
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('seed', range(3))
-def test_a_person_who_stops_one_metre_before_a_low_camera_stays_there(seed):
-    """The detector misses the legs from shortly before the person stops."""
-    simulator = Simulator(scenario_from({
-        'duration': 6.0, 'rate': 10.0, 'seed': seed, 'robot': {}, 'people': [
-            {'start': [1.2, 2.2], 'moves': [{'to': [1.2, 0.1], 'speed': 0.9}, {'wait': 9.0, 'facing': 3.1}]}]}))
-    exact, none = exact_detector(simulator), detections_without_scores([])
-    for step in run_scene(simulator, lambda frame: exact(frame) if frame.time_s < 2.2 else none)[22:]:
-        track, = step.moment.tracks
-        assert plane_distances([step.frame.people[0].position_m], [track.position_m]) < 0.4

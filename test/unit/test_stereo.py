@@ -35,15 +35,3 @@ def test_noise_of_depth_grows_with_its_square():
         depth_mm = StereoCamera(CAMERA, seed=1).measure(scene(wall_m), 0)[:, 100:].astype(float)
         noise_px = LEVEL_MM * depth_mm[depth_mm > 0].std() / (1000 * wall_m) ** 2 / STEPS_PER_PX
         assert 0.025 < noise_px < 0.1
-
-
-def test_without_noise_the_only_error_is_quantisation():
-    camera = Camera(8, 2000, 600, 600, 4, 1000)
-    depth_m = np.linspace(0.1, 25, 2000)[:, None]
-    depth_mm = StereoCamera(camera, params=NO_NOISE).measure(scene(depth_m, camera), 0).astype(float)
-    assert (depth_mm == depth_mm[:, :1]).all()
-    depth_mm, steps = depth_mm[:, 0], LEVEL_MM / 1000 / depth_m[:, 0]
-    in_range = (steps >= 30) & (steps <= 126 * STEPS_PER_PX)
-    np.testing.assert_array_equal(depth_mm[in_range], np.rint(LEVEL_MM / np.rint(steps[in_range].astype(np.float32))))
-    assert (np.diff(depth_mm[in_range]) >= 0).all()
-    assert not depth_mm[(steps < 29.5) | (steps > 126 * STEPS_PER_PX + 0.5)].any()
