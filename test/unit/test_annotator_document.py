@@ -96,16 +96,6 @@ def test_a_box_drawn_by_hand_is_estimated_and_chosen(document, folder):
     assert read_session(folder).frames[0].boxes_px == (NEAR_BOX, FAR_BOX)
 
 
-def test_a_box_drawn_by_hand_replaces_that_of_the_same_person(document, folder):
-    change_json(folder, lambda content: content['frames'][0]['detections'][0].update(box=[10, 4, 26, 30]))
-    document.refresh()
-    document.draw_box(0, (-5, 4, 26, 44))
-    assert document.measurements[0].detections[-1].box_px == (0, 4, 26, 44)
-    document.draw_box(0, NEAR_BOX)
-    assert document.estimates.of(0)[3][2] == pytest.approx(2.09)
-    assert read_session(folder).frames[0].boxes_px == (NEAR_BOX, FAR_BOX)
-
-
 def test_the_truth_stays_with_its_person_when_boxes_are_drawn_and_deleted(document):
     near_m, far_m = (-0.47, None, 2.0), (0.7, None, 3.0)
     document.set_truths([0], -0.47, 2.0)
@@ -172,9 +162,3 @@ def test_an_invalid_entry_is_shown_with_its_fault(folder, break_it, problem):
             edit()
     document.set_truths([2], 0.1, 2.0)
     assert read_json(folder)['frames'][2]['truth_mm'] == {'x': 100, 'z': 2000}
-
-
-def test_a_session_with_an_invalid_grid_is_rejected(folder):
-    change_json(folder, lambda content: content.update(grid=[{'name': 'A', 'x': float('nan'), 'z': 1}]))
-    with pytest.raises(SessionError, match='frames.json'):
-        Document(folder)

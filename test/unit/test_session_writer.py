@@ -1,16 +1,13 @@
-import contextlib
 import multiprocessing
 import os
 import pathlib
 import re
-import stat
 
 import numpy as np
 import pytest
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.images import DepthImage
-from ros_3d_bb.core.atomic_file import atomic_write, check_writable
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.sessions import session_writer
@@ -141,33 +138,3 @@ def test_a_full_disk_does_not_change_the_session(folder, monkeypatch, full_at):
     with pytest.raises(OSError):
         append(folder, measurement(1))
     assert content_of(folder) == before
-
-
-def test_an_error_does_not_change_the_file(tmp_path):
-    with session_writer.locked_update(str(tmp_path)) as content:
-        content['frames'].append({'id': 'a'})
-    before = (tmp_path / 'frames.json').read_bytes()
-    with pytest.raises(RuntimeError), session_writer.locked_update(str(tmp_path)) as content:
-        content['frames'] = []
-        raise RuntimeError
-    with pytest.raises(ValueError), session_writer.locked_update(str(tmp_path)) as content:
-        content['depth'] = float('nan')
-    assert (tmp_path / 'frames.json').read_bytes() == before
-
-
-def test_the_file_mode_follows_the_umask(tmp_path):
-    mask = os.umask(0o027)
-    try:
-        atomic_write(str(tmp_path / 'file'), b'data')
-    finally:
-        os.umask(mask)
-    assert stat.S_IMODE(os.stat(str(tmp_path / 'file')).st_mode) == 0o640
-
-
-@pytest.mark.parametrize('path, is_writable', [('new', True), ('old', True), ('folder', False), ('missing/new', False)])
-def test_it_is_checked_before_the_work_whether_a_file_can_be_written(tmp_path, path, is_writable):
-    (tmp_path / 'folder').mkdir()
-    (tmp_path / 'old').write_text('old')
-    with contextlib.ExitStack() if is_writable else pytest.raises(OSError, match=path):
-        check_writable(str(tmp_path / path))
-    assert sorted(os.listdir(str(tmp_path))) == ['folder', 'old'] and (tmp_path / 'old').read_text() == 'old'

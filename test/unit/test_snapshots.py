@@ -1,7 +1,6 @@
 import itertools
 
 import pytest
-from hypothesis import given, strategies as st
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.sessions.burst import Burst
@@ -42,18 +41,6 @@ def test_3d_boxes_have_the_stamp_of_the_depth_image():
     assert snapshots.newest[:6] == (7 * PERIOD, 7, 'depth', 7, 7, 'boxes3d')
 
 
-@given(st.integers(0, 29), st.integers(0, 5))
-def test_the_newest_complete_snapshot_is_kept_while_the_detector_works(delay_2d, more_delay_3d):
-    delay_3d = min(29, delay_2d + more_delay_3d)
-    snapshots = made()
-    for number in range(60):
-        send(snapshots, number, PARTS[:3])
-        for part, delay in (('boxes2d', delay_2d), ('boxes3d', delay_3d)):
-            if number >= delay:
-                send(snapshots, number - delay, [part])
-    assert parts_of(snapshots.newest) == (59 - delay_3d,) * 5
-
-
 def test_the_newest_images_are_returned_without_boxes_that_are_late():
     snapshots = made()
     assert snapshots.is_early
@@ -87,12 +74,3 @@ def test_a_burst_follows_a_countdown():
             assert burst.text(tenth / 10) == '%d/3' % len(stored_s)
             burst.report(tenth / 10, True)
     assert stored_s == [5.0, 6.0, 7.0] and not burst.is_active and burst.text(20.0) == ''
-
-
-def test_a_burst_can_be_cancelled_and_started_again():
-    burst = Burst(5.0, 3, 1.0)
-    burst.toggle(0.0)
-    burst.toggle(2.0)
-    assert not burst.is_due(6.0)
-    burst.toggle(10.0)
-    assert burst.is_due(15.0)
