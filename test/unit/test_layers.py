@@ -33,18 +33,6 @@ def imports_in(root):
 MODULES, OF_ANNOTATOR = imports_in(SOURCE), imports_in(ANNOTATOR)
 
 
-def circles_in(imported):
-    """The names that import each other, or lie between two that do, given the names that each one imports."""
-    left = set(imported)
-    while left:
-        used = set().union(*(imported[name] for name in left))
-        ends = {name for name in left if name not in used or not imported[name] & left}
-        if not ends:
-            break
-        left -= ends
-    return sorted(left)
-
-
 def test_algorithms_import_no_ros():
     assert len([module for module in MODULES if module.startswith(ALGORITHMS)]) > 50
     for module, (libraries, ours) in MODULES.items():
@@ -67,14 +55,3 @@ def test_the_annotator_imports_no_ros_and_the_noise_analysis_in_one_module():
         assert not any(name.startswith(with_ros) for name in ours), module
     assert [module for module, (_libraries, ours) in OF_ANNOTATOR.items()
             if any(name.startswith('ros_3d_bb_lab') for name in ours)] == ['ros_3d_bb_annotator.export']
-
-
-def test_no_file_and_no_folder_imports_one_that_imports_it():
-    """Imports in functions count, too."""
-    files, folders = {}, {}
-    for module, (_libraries, ours) in dict(MODULES, **OF_ANNOTATOR).items():
-        files[module] = ours | {name.rpartition('.')[0] for name in ours}
-        folders.setdefault(module.rpartition('.')[0], set()).update(
-            name.rpartition('.')[0] for name in files[module] & set(MODULES))
-    assert circles_in(files) == []
-    assert circles_in({folder: above - {folder} for folder, above in folders.items()}) == []

@@ -1,11 +1,8 @@
 import pytest
 
-from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb_lab.evaluation.navigation.navigation_scenes import DURATION_S, SCENES, scenario_of
-from ros_3d_bb_lab.evaluation.navigation.trial_result import Pace, summary
+from ros_3d_bb_lab.evaluation.navigation.trial_result import summary
 from ros_3d_bb_lab.simulation.scenario import scenario_from
-
-LEAD_NS = int(Pace.LEAD_S * NS)
 
 
 def trial(**others):
@@ -21,19 +18,6 @@ def test_scenes_are_valid_and_depend_on_the_seed_only(name):
     for content in contents:
         scenario = scenario_from(content)
         assert scenario.duration == DURATION_S and len(scenario.people) >= 1
-
-
-def test_time_waits_for_the_slowest_source():
-    pace = Pace()
-    pace.heard('cloud', 1 * NS)
-    pace.start(5 * NS, ['commands', 'tracks'])
-    assert pace.sources == {'cloud', 'commands', 'tracks'}
-    assert pace.new_limit(100.0) == 5 * NS + LEAD_NS
-    pace.heard('commands', 7 * NS)
-    assert pace.new_limit(100.1) is None
-    pace.heard('tracks', 6 * NS)
-    assert pace.new_limit(100.2) == 6 * NS + LEAD_NS
-    assert pace.late == 0
 
 
 def test_the_summary_of_trials():

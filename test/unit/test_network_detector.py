@@ -1,5 +1,3 @@
-from unittest import mock
-
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
@@ -9,8 +7,6 @@ from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetecto
 from ros_3d_bb.detection.yolov5.backends import open_runtime
 from ros_3d_bb.detection.yolov5.predictions import Backend
 from ros_3d_bb.sessions.session_reader import read_color, read_session
-from ros_3d_bb_lab.evaluation import detection_ranges
-from ros_3d_bb_lab.evaluation.detection_ranges import GREY
 
 
 class FixedRuntime(Backend):
@@ -95,21 +91,3 @@ def test_suppression_agrees_with_a_naive_implementation(count, limit, max_det, s
                             np.sort(random.random_sample(count))[::-1], random.randint(0, 2, count))
     kept = non_maximum_suppression(detections, limit, max_det)
     np.testing.assert_array_equal(kept.boxes, detections.boxes[naive_suppression(detections, limit, max_det)])
-
-
-class HighThings(object):
-    """Detects what is not grey and at least 60 pixels high."""
-
-    def detect(self, image):
-        lines, columns = np.nonzero(image[:, :, 0] != GREY)
-        box = [columns.min(), lines.min(), columns.max() + 1, lines.max() + 1]
-        boxes = np.array([box] if box[3] - box[1] >= 60 else [], float).reshape(-1, 4)
-        return Detections(boxes, np.ones(len(boxes)), np.zeros(len(boxes), int))
-
-
-def test_people_are_found_at_longer_ranges_in_shrunk_images(monkeypatch):
-    """A person who fills the image, 2 m away; 60 of 240 pixels are left at 8 m. Nearer people do not count."""
-    monkeypatch.setattr(detection_ranges, 'read_color', lambda _frame, _camera: np.zeros((240, 320, 3), np.uint8))
-    frames = [mock.Mock(truth_m=(0, None, z_m), boxes_px=((0, 0, 320, 240),)) for z_m in (2.0, 1.0)]
-    rows = detection_ranges.found_at_ranges(frames, None, {'high': HighThings()}, [2.0, 8.0, 9.0], 0.5)
-    assert rows == {'high': {'people': 1, 'at 2 m': 1, 'at 8 m': 1, 'at 9 m': 0}}

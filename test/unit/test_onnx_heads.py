@@ -64,19 +64,6 @@ def test_boxes_relative_to_the_input_are_those_of_rtdetr_or_rejected():
             layout_of([rows], HW, metadata)
 
 
-def test_rows_without_objectness_are_those_of_yolov6():
-    rows = np.hstack((np.random.RandomState(0).uniform(0, 100, (252, 4)), np.ones((252, 1)), np.zeros((252, 3))))
-    assert layout_of([rows[None]], HW, {}).head == 'yolov5'
-
-
-def test_unusual_distributions_by_stride_are_only_those_of_a_given_head():
-    outputs = outputs_of('nanodet', BOXES, SCORES, HW, bins=16)[0][0]
-    parts = [part[None] for values in (outputs[:, :3], outputs[:, 3:]) for part in np.split(values, [192, 240])]
-    with pytest.raises(ValueError, match='no known head'):  # they may be those of YOLOv8, whose input is another one
-        layout_of(parts, HW, {})
-    assert len(detections_in(parts, layout_of(parts, HW, {}, head='nanodet')).boxes) == 3
-
-
 def by_stride(channels):
     return [np.zeros((1, count) + size) for count in channels for size in ((12, 16), (6, 8), (3, 4))]
 

@@ -7,7 +7,6 @@ import pytest
 from ros_3d_bb.core.object_classes import COCO
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetector
-from ros_3d_bb.detection.onnx.heads import P3, P6
 from ros_3d_bb.detection.onnx.onnx_model import OnnxModel
 from ros_3d_bb.detection.weights import WeightsError
 from ros_3d_bb.detection.yolov5.backends import open_detector
@@ -145,15 +144,6 @@ def test_a_class_that_the_network_does_not_have_is_named(tmp_path, names, reason
 COLOR = (3, 200, 5)
 
 
-@pytest.mark.parametrize('head', ['yolov8', 'yolox', 'nanodet', 'nanodet-plus', 'picodet'])
-def test_outputs_without_a_batch_axis(tmp_path, head):
-    outputs = outputs_of(head, BOXES, SCORES, HW, P6 if head in ('nanodet-plus', 'picodet') else P3)
-    network = OnnxModel(write_constant_network(tmp_path / 'a.onnx', [output[0] for output in outputs]), 1)
-    assert network.description.endswith('head: ' + head)
-    found = network.candidates(np.zeros(HW + (3,), np.uint8), 0.25)
-    np.testing.assert_allclose(found.boxes[np.argsort(-found.scores)], BOXES, atol=1e-3)
-
-
 @pytest.mark.parametrize('shape, channels_last', [
     ((1, 3, 96, 128), False), ((1, 96, 128, 3), True), (('n', 3, 'h', 'w'), False), ((1, 'h', 'w', 3), True),
     ((1, 'channels', 'h', 'w'), False)])
@@ -229,12 +219,6 @@ def test_scores_that_are_none_are_rejected(tmp_path, monkeypatch):
     monkeypatch.setattr(network, '_run', lambda _image: [np.array([[(0, 0.9, 100, 50, 200, 300)]])])  # class first
     with pytest.raises(ValueError, match='scores.*200.*end-to-end'):
         network.candidates(np.zeros(HW + (3,), np.uint8), 0.25)
-
-
-def test_sizes_are_multiples_of_the_largest_stride(tmp_path):
-    outputs = outputs_of('yolov5', BOXES, SCORES, (192, 256), P6)  # for the size of the grey image
-    path = write_constant_network(tmp_path / 'a.onnx', outputs, (1, 3, 'h', 'w'))
-    assert OnnxModel(path, 1).stride == 64
 
 
 def test_a_size_that_the_network_cannot_process_is_named(tmp_path):

@@ -7,8 +7,6 @@ from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.planning.people_removal import are_inside, cylinders_of, pixels_inside, scan_parts
 from ros_3d_bb.planning.planner_view import (covariances_after, footprint_points, in_frame, position_after,
                                              predicted_to, usable_tracks, with_usable_covariances)
-from ros_3d_bb.tracking.types import OUT_OF_VIEW
-from ros_3d_bb_lab.simulation.simulator import upright
 from support.tracks import track_at
 
 
@@ -101,26 +99,10 @@ def segment_distances(points, start, end):
     return np.linalg.norm(points - start - share[:, None] * along, axis=1)
 
 
-def test_positions_become_less_certain_beyond_the_predictions():
-    track = track_at([3, 1, 0.9], [0, 0, 0], covariance=0.01 * np.eye(6))
-    track = track._replace(prediction_covariance_m2=(0.01 + 0.02 * np.arange(1, 9))[:, None, None] * np.eye(3))
-    np.testing.assert_allclose(covariances_after(track, np.array([-0.1, 2.0, 3.0]))[:, 0, 0], [0.01, 0.17, 0.37])
-
-
 def test_without_predictions_positions_become_less_certain_by_the_velocity():
     track = track_at([3, 1, 0.9], [0, 0, 0], np.empty((0, 3)), covariance=np.diag([0.01, 0.01, 0, 0.04, 0.09, 0]))
     found_m2 = covariances_after(track._replace(prediction_covariance_m2=np.empty((0, 3, 3))), [0.0, 2.0])
     np.testing.assert_allclose(found_m2, [np.diag([0.01, 0.01, 0]), np.diag([0.17, 0.37, 0])])
-
-
-@pytest.mark.parametrize('heading', [0.0, np.pi / 4, np.pi / 2])
-def test_marks_of_a_person_out_of_view_do_not_depend_on_the_heading(heading):
-    turn = upright(0, 0, 0, heading)[:3, :3]
-    covariance = np.zeros((6, 6))
-    covariance[:3, :3] = turn.dot(np.diag([0.23 ** 2, 0.1 ** 2, 0.01])).dot(turn.T)
-    track = track_at([3, 1, 0.9], turn.dot([1, 0, 0]), moving=True, covariance=covariance)
-    track = track._replace(status=OUT_OF_VIEW, prediction_covariance_m2=np.tile(covariance[:3, :3], (8, 1, 1)))
-    assert len(footprint_points([track], 0.3, 0.1)) == 0
 
 
 @given(random_tracks(), st.floats(0, 2))
@@ -184,14 +166,3 @@ def test_pixels_are_those_whose_points_lie_in_the_cylinder(place_m):
     expected = are_inside(transform_points(fixed_from_camera, points_m), cylinders) & (depth.values > 0)
     assert (pixels_inside(depth, CAMERA, fixed_from_camera, cylinders) == expected).all()
     assert expected.any() == (place_m in ((2.0, 0.3), (0.4, 0.1)))
-
-
-def test_lens_distortion_is_computed_once_for_all_images(monkeypatch):
-    """It takes longer than the rest."""
-    camera, calls, rays = CAMERA._replace(distortion_model='plumb_bob', distortion=(-0.1, 0, 0, 0, 0)), [], Camera.rays
-    monkeypatch.setattr(Camera, 'rays', lambda *arguments: calls.append(1) or rays(*arguments))
-    cylinders = cylinders_of([track_at([2, y, 0.85], [0, 0, 0]) for y in (-0.5, 0.5)], 0.0, MARGIN_M)
-    for depth_mm in (1800, 1900, 2000):
-        depth = DepthImage(np.full((48, 64), depth_mm, np.uint16), 0.001)
-        assert pixels_inside(depth, camera, transform_from((0, 0, 1), OPTICAL_ROTATION), cylinders).any()
-    assert len(calls) == 1

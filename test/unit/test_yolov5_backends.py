@@ -17,14 +17,6 @@ ON_TORCH, ON_ONNX = RuntimeParams('torch', 'cpu', 1), RuntimeParams('onnxruntime
 BOTH = [ON_TORCH, pytest.param(ON_ONNX, marks=needs_onnx)]
 
 
-@pytest.fixture(scope='module')
-def checkpoint(tmp_path_factory):
-    """Path of a checkpoint with random weights."""
-    path = str(tmp_path_factory.mktemp('weights') / 'random.pt')
-    write_checkpoint(path, layout('6.0', 'n', 3))
-    return path
-
-
 def image_of(height=96, width=128):
     return np.random.RandomState(0).randint(0, 256, (height, width, 3)).astype(np.uint8)
 
@@ -39,16 +31,6 @@ def test_raw_output_agrees_with_the_official_code(tmp_path, official_output, ran
     for image, rows, values in cases:
         difference = np.abs(run(image, -1)[rows] - values)
         assert difference[:, :4].max() <= 0.01 and difference[:, 4:].max() <= 1e-4
-
-
-@pytest.mark.parametrize('params', BOTH)
-def test_only_predictions_above_the_minimum_objectness_are_returned(checkpoint, params):
-    run = open_runtime(checkpoint, params)
-    everything = run(image_of(), -1)
-    levels = np.sort(everything[:, 4])
-    limit = levels[np.diff(levels).argmax()] + np.diff(levels).max() / 2  # in the widest gap: rounding has no effect
-    np.testing.assert_array_equal(run(image_of(), limit), everything[everything[:, 4] > limit])
-    assert run(image_of(), 1.0).shape == (0, 8)
 
 
 @needs_onnx
