@@ -3,17 +3,14 @@ from unittest import mock
 
 import numpy as np
 import pytest
-from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBoolRequest
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth, imgmsg_to_rgb
-from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg,
-                                                   boxes3d_to_msg, stamp_of, time_from)
-from ros_3d_bb.core.detection_pace import WINDOW
-from ros_3d_bb.core.params import params_from
+from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, boxes2d_from_msg, boxes3d_to_msg,
+                                                   stamp_of, time_from)
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
@@ -22,23 +19,18 @@ from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
-from ros_3d_bb.nodes.common import detector_output
 from ros_3d_bb.nodes.detector_node import DetectorNode
-from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.nodes.viewer_node import ViewerNode
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
-from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb.visualization.image_overlay import VALID_COLOR
-from ros_3d_bb.visualization.markers import AREA, MARKERS_TOPIC, MarkerParams
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
-from support.inputs import CAMERA, TARGETS, good_messages, send_image, transforms
+from support.inputs import CAMERA, good_messages, send_image
 from support.launching import loaded
 from support.masterless import masterless
 from support.ros import depth_message, header_at
-from support.two_cameras import boxes
 
 START_NS = 1000 * NS
 
@@ -129,11 +121,6 @@ def test_people_are_detected_with_stamp_and_frame_of_the_image(frame_id):
     assert ('tilt of the camera unknown' in counts) == (frame_id == 'unknown_to_tf')
 
 
-def test_a_changed_range_applies_from_the_next_image_on():
-    """One of the people is 4 m away and one 5 m."""
-    assert len(boxes2d_from_msg(answer(changed=DepthPeopleParams(max_depth=4.5))[0]).boxes) == 1
-
-
 def test_nothing_is_published_while_no_floor_is_known():
     """Neither from tf nor from a depth image: an empty array would mean that there are no people."""
     message, _drawn, counts, _true_boxes = answer('unknown_to_tf', people=[], robot={'pitch': -0.9})
@@ -192,47 +179,6 @@ def test_the_service_pauses_and_changed_parameters_apply_to_later_images(camera,
     assert len(sent(camera, image[0]).boxes) == 1
 
 
-def test_a_slow_network_gets_smaller_images_as_the_range_permits_and_then_fewer_at_a_steady_rate():
-    """All detections take 50 ms, at 30 Hz."""
-    clock = mock.Mock(monotonic=mock.Mock(side_effect=np.arange(0, 1000, 0.05)))
-    with masterless({'weights': 'blind.pt'}) as connections, mock.patch.object(detector_output, 'time', clock):
-        node, sizes, stamps_ns = TARGETS['detector_node yolov5'].make(), [], []
-        for number in range(4 * WINDOW):
-            messages = good_messages(START_NS + number * NS // 30)
-            for topic in (INFO_TOPICS[0], COLOR_TOPIC):
-                connections.send(topic, messages[topic])
-            sizes.append(node._worker.pace.size)
-            stamps_ns.append(newest(connections).stamp_ns)
-    assert [sizes[count * WINDOW - 1] for count in (1, 2, 3)] == [448, 384, 384]  # 320 is too small for 8 m
-    assert set(np.diff(stamps_ns[:3 * WINDOW])) <= {NS // 30, NS // 30 + 1}
-    assert len(set(stamps_ns[3 * WINDOW - 1:])) == 1 + WINDOW // 2
-    assert node._diagnostics.counts['changes of image size or rate'] == 3
-    assert node._diagnostics.counts['images skipped for a steady rate'] == WINDOW - WINDOW // 2
-
-
-def test_no_track_starts_in_ignored_areas_nor_behind_cells_of_the_map():
-    """A person 3 m ahead, one in an area at 5 m, and a poster on a wall at 7 m; the wall ends before y = 2."""
-    grid = OccupancyGrid(header=header_at(0, 'map'), data=[100] * 20)
-    grid.info.width, grid.info.height, grid.info.resolution = 1, 20, 0.1
-    grid.info.origin.position.x, grid.info.origin.position.y, grid.info.origin.orientation.w = 7.0, -1.0, 1.0
-    parameters, nodes = loaded('tracker.launch', 'map:=static_map')
-    assert ('map', 'static_map') in [tuple(remapping) for remapping in nodes['tracker_node'].remap_args]
-    with masterless({'use_map': parameters['/tracker_node/use_map'], 'tf_timeout': 0.0}) as connections:
-        node, areas = TrackerNode(), '[[[4.5, -0.5], [5.5, -0.5], [5.5, 0.5], [4.5, 0.5]]]'
-        node._reconfigure(*params_from({'ignored_areas': areas}, TrackerNodeParams, MarkerParams, *TRACKING_PARAMS))
-        connections.send('map', grid)
-        for number in range(10):
-            stamp_ns = START_NS + number * NS // 10
-            connections.send('/tf', transforms(stamp_ns))
-            centers_m = (1.0, 0.2, 3.0), (0.0, 0.2, 5.0), (0.0, 0.2, 7.2), (-2.0, 0.2, 7.2)
-            connections.send(BOXES3D_TOPIC, boxes(stamp_ns, centers_m=centers_m))
-        message, markers = (connections.publishers[topic].newest for topic in (TRACKS_TOPIC, MARKERS_TOPIC))
-    assert message.header == header_at(stamp_ns, 'map')
-    assert sorted(round(track.pose.pose.position.y) for track in message.objects) == [-1, 2]
-    assert AREA in [marker.ns for marker in markers.markers]
-    assert node._diagnostics.counts['boxes in ignored areas'] >= 20
-
-
 @pytest.fixture
 def viewer(tmp_path):
     """viewer_node, whose session is a folder to be created."""
@@ -273,18 +219,3 @@ def test_images_without_boxes_are_stored_after_a_warning(viewer):
     assert viewer.node.capture()[0]
     stored, = read_session(viewer.folder).frames
     assert stored.stamp_ns == START_NS + 11 * NS // 10 and stored.detections == ()
-
-
-def test_the_tilt_of_the_camera_is_stored_once_it_is_known(tmp_path):
-    """The person is estimated upright in the floor frame, as by bbox3d_node."""
-    with masterless({'window': False, 'session': str(tmp_path)}) as connections:
-        node = ViewerNode()
-        for number in range(2):
-            stamp_ns = START_NS + number * NS // 10
-            for topic, message in good_messages(stamp_ns).items():
-                if topic in connections.subscribers:
-                    connections.send(topic, message)
-            assert node.capture()[0]
-            connections.send('/tf', transforms(stamp_ns))
-    unknown, known = read_session(str(tmp_path)).frames
-    assert unknown.up is None and known.up.tolist() == [0, -1, 0]

@@ -39,18 +39,6 @@ def scene(wall_m, person_m=PERSON_M):
     return depth_m
 
 
-class Tilting(object):
-    """Transforms of a camera with the given vectors that point up, one for each image."""
-
-    def __init__(self, ups):
-        self._ups = iter(ups)
-
-    def lookup(self, _target_frame, _source_frame, _stamp):
-        camera_from_floor = np.eye(4)
-        camera_from_floor[:3, 2] = next(self._ups)
-        return camera_from_floor
-
-
 class Estimation(object):
     """A source with one camera_info, and the estimation stage; `boxes3d` has the results of all frames."""
 
@@ -67,27 +55,6 @@ class Estimation(object):
 
     def add_boxes(self, rects_px, labels=None, scores=None, header=HEADER, image_size=None, color=None):
         self._source.add_boxes(boxes2d_to_msg(np.array(rects_px), header, labels, scores, image_size), 0, color)
-
-
-@pytest.mark.parametrize('color', [None, (40, 90, 120)])
-def test_boxes_with_their_image_have_the_colours_of_clothes(color):
-    run = Estimation(Bbox3dParams(), EventCounter())
-    run.add_depth(scene(6.0))
-    image = None if color is None else np.full((480, 640, 3), color, np.uint8)
-    run.add_boxes([PERSON_PX], color=image)
-    red, green, blue = np.log(np.array(color or (0, 0, 0)) + 8.0)
-    expected = (red - green, blue - green, (red + green + blue) / 3)
-    assert run.boxes3d[0].appearance == (None if color is None else pytest.approx(2 * expected))
-
-
-def test_each_image_has_the_tilt_of_the_camera_at_its_time():
-    ups = (0, -1, 0), (0, -1, 0), (0, -np.cos(0.4), np.sin(0.4)), (0, -1, 0)
-    run = Estimation(Bbox3dParams(), EventCounter(), Tilting(ups))
-    run.add_depth(scene(6.0))
-    for _image in ups:
-        run.add_boxes([PERSON_PX])
-    lengths_m = [box.center_m[2] for box in run.boxes3d]
-    assert lengths_m[0] == lengths_m[1] == lengths_m[3] != lengths_m[2]
 
 
 def test_without_floor_frame_the_tilt_is_that_in_the_root_of_tf(events):
@@ -132,28 +99,6 @@ def test_boxes_have_the_stamp_of_their_depth_image_which_is_used_once():
     source.end()
     assert [header.stamp.to_nsec() for header in headers] == depth_stamps_ns
     assert events.counts['images with a used depth image'] == 3
-
-
-@pytest.mark.parametrize('depth_hz, offset_ms, gap_ms', [(15, 0, 0), (15, 27, 7), (6, 0, 0), (6, 80, 17)])
-@pytest.mark.parametrize('latency_ms', [0, 50, 250])
-def test_a_depth_image_is_paired_with_the_nearest_colour_image(depth_hz, offset_ms, gap_ms, latency_ms):
-    """Of a camera with 30 colour images a second."""
-    pairs_ms, ms = [], NS // 1000
-    source = RgbdSource(Bbox3dParams(), EventCounter(), lambda boxes, depth, _camera: pairs_ms.append(
-        (boxes.stamp_ns // ms, depth.header.stamp.to_nsec() // ms)))
-    source.add_camera_info(CameraInfo(width=640, height=480, K=CAMERA_INFO.K), 0)
-    depth_ms = [1000 * number // depth_hz + offset_ms for number in range(2 * depth_hz - 1)]
-    color_ms = [1000 * number // 30 for number in range(60)]
-    arrivals = [(stamp_ms, stamp_ms, False) for stamp_ms in depth_ms]
-    for now_ms, stamp_ms, has_boxes in sorted(arrivals + [(ms + latency_ms, ms, True) for ms in color_ms]):
-        header = Header(stamp=time_from(1000 * NS + stamp_ms * ms), frame_id='camera')
-        if has_boxes:
-            source.add_boxes(boxes2d_to_msg(np.array([PERSON_PX]), header), now_ms * ms)
-        else:
-            source.add_depth(fill_image(Image(header=header), scene(6.0), '32FC1'), now_ms * ms)
-    source.end()
-    gaps_ms = [abs(boxes_ms - own_ms) for boxes_ms, own_ms in pairs_ms[1:]]  # of the first one, the period is unknown
-    assert len(gaps_ms) == len(depth_ms) - 1 and max(gaps_ms) <= gap_ms
 
 
 def estimate(depth_m, rects_px, events, estimator='foreground', labels=None, scores=None, **params):

@@ -7,7 +7,6 @@ import tf2_ros
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.conversions.camera_msgs import transform_messages
-from ros_3d_bb.nodes.common import tf_lookup as module
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from support.masterless import masterless
 
@@ -58,20 +57,6 @@ def test_the_missing_frame_of_each_camera_is_named(transforms):
         assert 'tf has no frame %s;' % camera in why_not(transforms, camera)
 
 
-def test_lookups_of_other_cameras_succeed_while_a_fault_is_explained(transforms, monkeypatch):
-    """The tree is read while the other thread holds it up."""
-    looked = []
-
-    def slow(_links, target, source, stamp_s):
-        thread = threading.Thread(target=lambda: looked.append(transforms.lookup('map', 'base_link', STAMP)))
-        thread.daemon = True
-        thread.start()
-        thread.join(10)
-        return 'gone', ''
-    monkeypatch.setattr(module, 'why_missing', slow)
-    assert why_not(transforms, 'front') == 'gone' and len(looked) == 1
-
-
 def test_a_transform_of_the_future_blocks_no_lookup():
     with masterless() as connections:
         transforms, missed = Transforms(wait_s=0.0), []
@@ -102,17 +87,6 @@ def test_a_transform_of_the_future_does_not_stop_the_latest_pose():
             connections.send('/tf', TFMessage(links))
             if number < 10 or number >= 12:
                 assert transforms.latest('map', 'base_link', 0.5)[0][0, 3] == number
-
-
-def test_one_late_transform_does_not_replace_the_latest_pose():
-    with masterless() as connections:
-        transforms, connections.now = Transforms(wait_s=0.0), STAMP
-        for seconds in (100, 80):
-            connections.send('/tf', TFMessage([link('map', 'base_link', rospy.Time(seconds))]))
-        connections.send('/tf', TFMessage([link('map', 'front', STAMP)]))
-        assert transforms.lookup('map', 'base_link', rospy.Time(100))[0, 3] == 0
-        transforms.latest('map', 'base_link', 0.5)
-        assert transforms.lookup('map', 'base_link', rospy.Time(100))[0, 3] == 0
 
 
 @pytest.mark.parametrize('in_flight_s', [0.05, 5.9])
