@@ -54,14 +54,6 @@ def test_only_camera_link_is_added_because_the_driver_publishes_the_others(robot
     np.testing.assert_allclose(base_from('camera_link', description)[:3, 3], CAMERA_POSITION)
 
 
-def test_variables_set_position_and_tilt(robot, monkeypatch):
-    for name, value in (('OFFSET', '0.1 -0.05 0.4'), ('RPY', '0 0.5 0')):
-        monkeypatch.setenv('JACKAL_D435I_' + name, value)
-    base_from_camera = base_from('camera_link', robot('jackal_d435i'))
-    np.testing.assert_allclose(base_from_camera[:3, 3], (0.1, -0.05, 0.4))
-    np.testing.assert_allclose(base_from_camera[:3, 0], (np.cos(0.5), 0, -np.sin(0.5)), atol=1e-12)  # tilted down
-
-
 @pytest.mark.parametrize('stream', ['color', 'depth'])
 def test_optical_frames_are_at_the_position_in_the_thesis_and_face_forward(robot, stream):
     base_from_optical = base_from('camera_%s_optical_frame' % stream, robot())
@@ -104,11 +96,3 @@ def test_the_launch_file_starts_gazebo_the_robot_and_the_pipeline(tmp_path):
     assert 'camera_color_optical_frame' in parameters['/robot_description']
     assert parameters['/detector_node/weights'] == '/some/yolov5n.pt'
     assert parameters['/tracker_node/target_frame'] == 'odom'
-
-
-def test_rate_lockstep_and_navigation_are_passed_on(tmp_path):
-    stand_in_gazebo(tmp_path)
-    parameters = dumped('gazebo.launch', tmp_path, 'detector:=depth', 'fps:=12', 'lockstep:=true', 'navigation:=true')
-    assert '<update_rate>12</update_rate>' in parameters['/robot_description']
-    assert given_to_stand_ins(parameters)['extra_gazebo_args'] == '--lockstep'
-    assert parameters['/move_base/global_costmap/global_frame'] == 'odom'
