@@ -3,14 +3,13 @@
 They need a master because of ROS time, tf2 and deadlines. Stamps are those of the clock, as from a camera: a tenth of a
 second old. Their outputs are tested without a master in test/workspace, the speeds in test/unit/test_safe_speed.py.
 """
-import signal
 import time
 
 import numpy as np
 import pytest
 import rospy
 from geometry_msgs.msg import Twist, Vector3
-from sensor_msgs.msg import LaserScan, PointCloud2
+from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float32
 from tf2_msgs.msg import TFMessage
 
@@ -19,7 +18,6 @@ from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import TrackedObjectArray
-from ros_3d_bb_lab.evaluation.launching import running
 from support.ros import Recorder, header_at, person, publisher, wait_until
 
 LATENCY_NS = NS // 10
@@ -90,13 +88,3 @@ def test_people_are_removed_from_the_scan(rig):
         wait_until(lambda: rig.static_scans.messages[-1].header.stamp == stamp, 'the scan')
         return 17 <= np.isnan(rig.static_scans.messages[-1].ranges).sum() <= 21
     wait_until(is_removed, 'a scan without the person')
-
-
-def test_a_bridge_that_ends_empties_its_outputs(rig):
-    with running(['rosrun', 'ros_3d_bb', 'planner_bridge_node', '__name:=second_bridge']) as process, \
-            Recorder('second_bridge/points', PointCloud2) as recorder:
-        wait_until(lambda: rig.tracks.get_num_connections() == 4, 'the second bridge')
-        rig.send((1.0, 2.0))
-        wait_until(lambda: recorder.messages and recorder.messages[-1].width, 'points')
-        process.send_signal(signal.SIGINT)
-        wait_until(lambda: not recorder.messages[-1].width, 'an empty cloud')
