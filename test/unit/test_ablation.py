@@ -1,7 +1,7 @@
 import pytest
 
 from ros_3d_bb.estimation import box3d_estimator, depth_samples
-from ros_3d_bb_lab.evaluation.ablation.benchmark import MECHANISMS, Mechanism, ablate, check, without
+from ros_3d_bb_lab.evaluation.ablation.benchmark import MECHANISMS, Mechanism, ablate, check
 
 
 @pytest.mark.parametrize('mechanism', MECHANISMS, ids=lambda mechanism: mechanism.name)
@@ -18,10 +18,3 @@ def test_a_mechanism_is_off_wherever_it_is_imported_and_on_again_afterwards():
     assert ablate([reaches_mm, reaches_mm], [mechanism]) == {
         '': {key: 2 * value for key, value in before_mm.items()}, 'reach of a body': {'here': 14, 'there': 14}}
     assert reaches_mm() == before_mm
-
-
-def test_a_mechanism_that_does_not_exist_is_named():
-    missing = Mechanism('reach', 'estimation.depth_samples', 'RectSamples.reach', None)
-    with pytest.raises(ValueError, match="'reach': ros_3d_bb.estimation.depth_samples has no RectSamples.reach"):
-        with without(missing):
-            pass

@@ -1,15 +1,25 @@
+import csv
+import json
 import os
+import re
 
 import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.sessions.session_reader import SessionError, read_session
+from ros_3d_bb_annotator.command_line import main
 from ros_3d_bb_annotator.document import Document
+from ros_3d_bb_annotator.export import export
+from ros_3d_bb_annotator.lengths import parse_length
+from ros_3d_bb_annotator.marks import Mark, parse_marks
 from ros_3d_bb_annotator.validation import problems_of
+from ros_3d_bb_lab.evaluation.noise.tables import read_table
 from support.small_session import (FAR_BOX, NEAR_BOX, NEAR_MM, change_json, read_json, write_measurement,
                                    write_small_session)
+from support.synthetic_session import write_synthetic_session
 
 
 def states(document):
@@ -162,3 +172,95 @@ def test_an_invalid_entry_is_shown_with_its_fault(folder, break_it, problem):
             edit()
     document.set_truths([2], 0.1, 2.0)
     assert read_json(folder)['frames'][2]['truth_mm'] == {'x': 100, 'z': 2000}
+
+
+MARKS = (Mark('A1', -0.6, 1.5), Mark('B1', 0.0, 1.5))
+
+
+@pytest.mark.parametrize('text', [
+    'A1, -600, 1500\nB1, 0, 1500', 'name,x,z\n"A1",-600,1500\n\n"B1",0,1500\n', 'A1\t-600\t1500\r\nB1\t0\t1500',
+    'A1;-0,6 m;1,5 m\nB1;0;1500', 'Mark X Z\nA1 -60cm 150cm\nB1 0 1.5m'])
+def test_tables_are_parsed(text):
+    assert parse_marks(text) == MARKS
+
+
+def test_marks_whose_names_begin_as_a_header_are_kept():
+    marks = parse_marks('Name;X;Z\nMark 1;-600;1500\nLabel B;0;1500')
+    assert marks == parse_marks('Mark 1;-600;1500\nLabel B;0;1500')
+    assert [mark.name for mark in marks] == ['Mark 1', 'Label B']
+
+
+@pytest.mark.parametrize('text,named', [
+    ('A1, -600', 'line 1 is'), ('A1, -600, 1500\nB1, far, 1500', "line 2: 'far' is not a length"),
+    ('A1, 0, 0', 'line 1: Z is 0 mm; at least 50 mm'),
+    (', 0, 1500', 'line 1: the name is empty'), ('A1, 0, 1500\na1, 0, 2000', 'a1 is not unique'),
+    ('Name, X [m], Z [m]\nA1, -0.6, 1.5', 'line 2: Z is 1.5 mm; at least 50 mm')])
+def test_invalid_tables_are_rejected(text, named):
+    with pytest.raises(ValueError, match=named):
+        parse_marks(text)
+
+
+@pytest.mark.parametrize('text,expected_m', [
+    ('1230', 1.23), ('1.23m', 1.23), ('1,23 m', 1.23), ('1,2305', 0.001231), ('\u2212650', -0.65), (' 12 cm ', 0.12),
+    ('.5m', 0.5), ('1,230 m', 1.23), ('1.230', 0.00123), ('-0', 0.0), ('100000', 100.0)])
+def test_lengths_are_parsed(text, expected_m):
+    assert parse_length(text) == pytest.approx(expected_m, abs=5e-7)
+    assert str(parse_length(text)) != '-0.0'
+
+
+@pytest.mark.parametrize('text,named', [
+    ('1,230', '1230 mm .*1.230 mm'), ('100.1m', '100 m')]
+    + [(text, re.escape(repr(text))) for text in ('', 'm', '1 2', '1.2.3', '1e3', 'nan', '1 km', '\u0661', '1_0')])
+def test_invalid_and_ambiguous_lengths_are_rejected(text, named):
+    with pytest.raises(ValueError, match=named):
+        parse_length(text)
+
+
+def test_a_row_contains_box_estimates_and_truth_in_all_axes(document, tmp_path):
+    document.set_truths([0], -0.5, 2.1004, 0.01)
+    path = str(tmp_path / 'table.csv')
+    assert export(document, path, 'foreground') == 1
+    with open(path, newline='') as stream:
+        row, = csv.DictReader(stream)
+    x_m, y_m, z_m = document.estimates.of(0)[0]
+    assert (row['id'], row['label'], row['stamp']) == ('m0', 'by the door', '1616161616.000000005')
+    assert [int(row[edge]) for edge in ('x1', 'y1', 'x2', 'y2')] == list(NEAR_BOX) and row['implausible'] == ''
+    assert [float(row[axis + ' measured']) for axis in 'XYZ'] == pytest.approx(
+        [1000 * x_m, 1000 * y_m, 1000 * z_m], abs=0.06)
+    assert [float(row[axis + ' recorded']) for axis in 'XYZ'] == [-466.5, 33, 2000]
+    assert [float(row[axis + ' true']) for axis in 'XYZ'] == [-500, 10, 2100.4]
+    assert float(row['Z error']) == pytest.approx(1000 * z_m - 2100.4, abs=0.06)
+    assert read_table(path, 'Z').truth_m.tolist() == [[-0.5, 2.1004]]
+
+
+@pytest.fixture
+def annotated_folder(tmp_path):
+    """Session whose truth differs from the estimates by 0.1 m."""
+    write_small_session(str(tmp_path))
+    change_json(str(tmp_path), lambda content: [entry.update(truth_mm={'x': -466.5, 'z': 2100})
+                                                for entry in content['frames']])
+    return str(tmp_path)
+
+
+@pytest.mark.slow
+def test_the_output_folder_and_the_estimator_of_the_analysis_can_be_chosen(tmp_path, capsys):
+    session, out = write_synthetic_session(str(tmp_path / 'session')), str(tmp_path / 'out')
+    assert main(['--analyse', session, '--out', out, '--estimator', 'recorded']) == 0
+    text = capsys.readouterr().out
+    assert 'f(z) = ' in text and 'report: %s' % os.path.join(out, 'report.html') in text
+    assert {'report.html', 'summary.json', 'error_model.yaml', 'z_error.png'} <= set(os.listdir(out))
+    with open(os.path.join(out, 'summary.json')) as stream:
+        assert len(json.load(stream)['z']['clusters']) == 6
+    assert read_error_model(os.path.join(out, 'error_model.yaml')).provenance.estimator == 'recorded'
+
+
+@pytest.mark.parametrize('break_it,problem', [
+    (lambda entry: entry['detections'][0].update(box=[10, 4, 26, 49]), 'box (10, 4, 26, 49) is not inside the image'),
+    (lambda entry: entry.update(truth_mm={'x': -466.5, 'z': 3600}), 'is implausible'),
+    (lambda entry: entry.update(detections=[]), 'nobody was found')])
+def test_problems_are_listed(annotated_folder, capsys, break_it, problem):
+    change_json(annotated_folder, lambda content: break_it(content['frames'][1]))
+    assert main(['--validate', annotated_folder]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith('m1: ') and problem in '\n'.join(lines)
+    assert lines[-1].endswith((' 1 problem', ' 2 problems'))
