@@ -1,4 +1,4 @@
-"""people_removal_node, planner_bridge_node and speed_limit_node with generated tracks, scans and commands.
+"""people_removal_node and speed_limit_node with generated tracks, scans and commands.
 
 They need a master because of ROS time, tf2 and deadlines. Stamps are those of the clock, as from a camera: a tenth of a
 second old. Their outputs are tested without a master in test/workspace, the speeds in test/unit/test_safe_speed.py.
@@ -24,7 +24,6 @@ LATENCY_NS = NS // 10
 COMMAND = Twist(linear=Vector3(x=1.2), angular=Vector3(z=0.6))
 BEAMS = 181
 OPEN_M = np.full(BEAMS, np.inf)
-CORNER_M = np.where(np.arange(BEAMS) > 110, 1.5, np.inf)  # from 20 degrees on the left
 BESIDE = 5.0, -6.0
 
 
@@ -72,13 +71,6 @@ def test_commands_are_limited_before_a_person_and_keep_their_path(rig):
     linear, angular, limit = rig.commanded((6.6, 1.4))
     assert 0.4 < linear < 1.1 and angular == pytest.approx(linear / 2)
     assert linear == pytest.approx(limit, abs=0.12)  # one of them is computed later, and the pose may be 0.1 s older
-
-
-def test_commands_are_limited_before_a_blind_corner_and_without_scans(rig):
-    assert rig.commanded(BESIDE, ranges_m=CORNER_M)[0] == pytest.approx(0.3)
-    assert rig.commanded(BESIDE, ranges_m=np.full(BEAMS, 1.5))[0] == pytest.approx(1.2)
-    assert rig.commanded(BESIDE, ranges_m=None)[0] == pytest.approx(0.3)
-    wait_until(lambda: rig.limits.messages[-1].data == 0.0, 'the limit without tracks')
 
 
 def test_people_are_removed_from_the_scan(rig):

@@ -1,7 +1,7 @@
-"""simulation.launch as in `./run demo`, with one and with two cameras, and the time of simulator_node. Needs a master.
+"""simulation.launch as in `./run demo`, with one and with two cameras. Needs a master.
 
-The scene with two cameras is about the names of all nodes and topics together; test_cameras.py compares its tracks with
-the truth.
+The scene with two cameras is about the names of all nodes and topics together; test_scenes_in_bags.py compares tracks
+with the truth.
 """
 import os
 
