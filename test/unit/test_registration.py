@@ -96,8 +96,7 @@ def with_focal(focal_px):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('people,beside_m,focal_px', [(WALKING, 0.05, 385.0), (APPROACHING, 0.075, 525.0),
-                                                      (APPROACHING, -0.05, 575.0), (WALKING, 0.05, 614.0)])
+@pytest.mark.parametrize('people,beside_m,focal_px', [(WALKING, 0.05, 385.0), (APPROACHING, -0.05, 575.0)])
 def test_depth_from_beside_colour_is_recognised(people, beside_m, focal_px):
     fault = compared(scene(people, beside_m=beside_m, camera=with_focal(focal_px)))
     zoom, = re.findall('enlarged ([0-9.]+) times', fault)
@@ -105,7 +104,7 @@ def test_depth_from_beside_colour_is_recognised(people, beside_m, focal_px):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('people,seed', [([], 0), (WALKING, 0), (APPROACHING, 1)])
+@pytest.mark.parametrize('people,seed', [([], 0), (APPROACHING, 1)])
 def test_aligned_depth_is_not_reported(people, seed):
     assert not compared(scene(people, seed))
 
@@ -114,9 +113,3 @@ def test_recorded_images_are_not_reported(session_folder):
     session = read_session(session_folder)
     images = [(read_color(frame, session.camera), read_depth(frame, session)) for frame in session.frames[::3]]
     assert not compared(images[:IMAGES]) and not compared(images)
-
-
-def test_images_in_which_nothing_moves_and_other_sizes_give_no_answer():
-    color, depth = next(scene(WALKING, beside_m=0.05, camera=with_focal(385.0)))
-    assert not compared([(color, depth)] * IMAGES)
-    assert not compared([(color[::2], depth)])

@@ -12,12 +12,12 @@ from support.inputs import TARGETS, good_messages, send_image, transforms
 from support.masterless import masterless, on_the_wire
 
 START_NS, PERIOD_NS = 1000 * NS, NS // 30
-TEXTS = ('', 'no_such_frame', '/camera', 'x' * 1000, '%s%n', 'do\x07g', ';stamp=1.000000000;stamp=x', ';scores=nan',
-         ';classes=dog,', 'boxes;stamp=0.000000000;frame=camera', '16UC1', 'bayer_rggb8', 'equidistant')
-FLOATS = float('nan'), float('inf'), -float('inf'), 0.0, -1.0, 3e38
+TEXTS = ('', 'no_such_frame', 'x' * 1000, '%s%n', 'do\x07g', ';stamp=1.000000000;stamp=x', ';scores=nan',
+         'boxes;stamp=0.000000000;frame=camera', 'bayer_rggb8', 'equidistant')
+FLOATS = float('nan'), -1.0, 3e38
 DURATIONS = genpy.Duration(), genpy.Duration(-5), genpy.Duration(2 ** 31 - 1)
 EXTREME_TIMES = genpy.Time(), genpy.Time(0, 1), genpy.Time(2 ** 32 - 1, NS - 1)
-OFFSETS_S = -900, -5, 10, 3600
+OFFSETS_S = -5, 3600
 
 
 def fields_of(message):
@@ -39,7 +39,7 @@ def others(kind, value, stamp_ns):
     if bracket:
         firsts = others(element, value[0], stamp_ns) if len(value) else []
         changed = [[first] + list(value[1:]) for first in firsts]
-        return changed if length != ']' else changed + [[], list(value[:-1]), list(value) * 2, list(value) * 100]
+        return changed if length != ']' else changed + [[], list(value[:-1]), list(value) * 100]
     if '/' in kind:
         return [type(value)()]
     if kind == 'time':
@@ -49,7 +49,7 @@ def others(kind, value, stamp_ns):
     if 'int' in kind:
         bits = int(kind.lstrip('uint'))
         low, high = (0, 2 ** bits - 1) if kind.startswith('u') else (-2 ** (bits - 1), 2 ** (bits - 1) - 1)
-        return {low, high, max(value - 1, low), min(value + 1, high)}
+        return {low, high, min(value + 1, high)}
     return {'string': TEXTS, 'duration': DURATIONS, 'bool': (not value,)}[kind]
 
 

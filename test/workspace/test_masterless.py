@@ -47,7 +47,8 @@ def example():
     return names['MiddleDetector']
 
 
-SCENE = {'duration': 1.5, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}]}
+IMAGES = 8
+SCENE = {'duration': IMAGES / 10, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}]}
 
 
 CODECS = {'plain': {}, 'compressed': {COLOR_TOPIC: 'jpeg', DEPTH_TOPIC: 'compressedDepth rvl'}}
@@ -67,16 +68,17 @@ def bags(request, tmp_path_factory):
     return str(folder / 'in.bag'), str(folder / 'out.bag')
 
 
-@pytest.mark.parametrize('node_class, input_bag, params, topics', [
-    (DetectorNode, 0, {'detector': 'depth'}, ['yolo_bounding_box']), (Bbox3dNode, 1, {}, ['ros_3d_bb/bb_3d']),
-    (TrackerNode, 1, {'tf_timeout': 0.0}, ['ros_3d_bb/tracks', 'visualization_marker_array']),
-    (PeopleNode, 0, {'detector_node': {'detector': 'depth'}}, [
-        'yolo_bounding_box', 'ros_3d_bb/bb_3d', 'ros_3d_bb/tracks'])])
+@pytest.mark.parametrize('bags, node_class, input_bag, params, topics', [
+    ('plain', DetectorNode, 0, {'detector': 'depth'}, ['yolo_bounding_box']),
+    ('plain', Bbox3dNode, 1, {}, ['ros_3d_bb/bb_3d']),
+    ('plain', TrackerNode, 1, {'tf_timeout': 0.0}, ['ros_3d_bb/tracks', 'visualization_marker_array']),
+    ('compressed', PeopleNode, 0, {'detector_node': {'detector': 'depth'}}, [
+        'yolo_bounding_box', 'ros_3d_bb/bb_3d', 'ros_3d_bb/tracks'])], indirect=['bags'])
 def test_process_bag_writes_the_messages_that_the_nodes_publish(bags, node_class, input_bag, params, topics):
     found = published(node_class, bags[input_bag], params, topics)
     for topic in topics:
         expected = messages_in(bags[1], '/' + topic)['/' + topic]
-        assert len(expected) == 15
+        assert len(expected) == IMAGES
         assert [str(message) for message in found[topic]] == [str(message) for message in expected]
 
 
@@ -92,7 +94,7 @@ def test_a_detector_in_the_registry_runs_in_bags_and_nodes(bags, tmp_path, monke
     topics = [BOXES_TOPIC, BOXES3D_TOPIC, TRACKS_TOPIC]
     found = published(PeopleNode, bags[0], {'detector_node': dict(params, detector='middle')}, topics)
     expected = messages_in(tmp_path / 'out.bag')
-    assert len(found[BOXES_TOPIC]) == 15 and found[BOXES_TOPIC][0].data == (256, 0, 384, 480)
+    assert len(found[BOXES_TOPIC]) == IMAGES and found[BOXES_TOPIC][0].data == (256, 0, 384, 480)
     for topic in topics:
         assert list(map(str, found[topic])) == list(map(str, expected['/' + topic]))
 
