@@ -1,5 +1,4 @@
 import csv
-import json
 import os
 import re
 
@@ -8,7 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.sessions.session_reader import SessionError, read_session
 from ros_3d_bb_annotator.command_line import main
 from ros_3d_bb_annotator.document import Document
@@ -19,7 +17,6 @@ from ros_3d_bb_annotator.validation import problems_of
 from ros_3d_bb_lab.evaluation.noise.tables import read_table
 from support.small_session import (FAR_BOX, NEAR_BOX, NEAR_MM, change_json, read_json, write_measurement,
                                    write_small_session)
-from support.synthetic_session import write_synthetic_session
 
 
 def states(document):
@@ -106,24 +103,6 @@ def test_a_box_drawn_by_hand_is_estimated_and_chosen(document, folder):
     assert read_session(folder).frames[0].boxes_px == (NEAR_BOX, FAR_BOX)
 
 
-def test_the_truth_stays_with_its_person_when_boxes_are_drawn_and_deleted(document):
-    near_m, far_m = (-0.47, None, 2.0), (0.7, None, 3.0)
-    document.set_truths([0], -0.47, 2.0)
-    document.draw_box(0, (12, 6, 28, 44))  # of the same person
-    assert document.measurements[0].truths == {2: near_m}
-    document.draw_box(0, (30, 5, 38, 20))  # of another one
-    assert document.measurements[0].person == 3 and document.measurements[0].truths == {2: near_m}
-    wall_m = document.estimates.of(0)[3][2]
-    document.draw_box(0, FAR_BOX, 3)
-    assert len(document.measurements[0].detections) == 4 and document.estimates.of(0)[3][2] < wall_m - 0.5
-    document.set_truths([0], 0.7, 3.0)
-    assert document.measurements[0].truths == {2: near_m, 3: far_m}
-    document.delete_box(0)
-    assert document.measurements[0].truths == {2: near_m} and document.measurements[0].person == 0
-    document.set_truths([0], 0.7, 3.0)  # nobody is selected any more
-    assert document.measurements[0].truths == {1: far_m, 2: near_m}
-
-
 @pytest.mark.parametrize('break_it', [
     lambda document: os.remove(document.measurements[0].depth_path),
     lambda document: cv2.imwrite(document.measurements[0].depth_path, np.zeros((48, 64), np.uint16))])
@@ -184,12 +163,6 @@ def test_tables_are_parsed(text):
     assert parse_marks(text) == MARKS
 
 
-def test_marks_whose_names_begin_as_a_header_are_kept():
-    marks = parse_marks('Name;X;Z\nMark 1;-600;1500\nLabel B;0;1500')
-    assert marks == parse_marks('Mark 1;-600;1500\nLabel B;0;1500')
-    assert [mark.name for mark in marks] == ['Mark 1', 'Label B']
-
-
 @pytest.mark.parametrize('text,named', [
     ('A1, -600', 'line 1 is'), ('A1, -600, 1500\nB1, far, 1500', "line 2: 'far' is not a length"),
     ('A1, 0, 0', 'line 1: Z is 0 mm; at least 50 mm'),
@@ -240,18 +213,6 @@ def annotated_folder(tmp_path):
     change_json(str(tmp_path), lambda content: [entry.update(truth_mm={'x': -466.5, 'z': 2100})
                                                 for entry in content['frames']])
     return str(tmp_path)
-
-
-@pytest.mark.slow
-def test_the_output_folder_and_the_estimator_of_the_analysis_can_be_chosen(tmp_path, capsys):
-    session, out = write_synthetic_session(str(tmp_path / 'session')), str(tmp_path / 'out')
-    assert main(['--analyse', session, '--out', out, '--estimator', 'recorded']) == 0
-    text = capsys.readouterr().out
-    assert 'f(z) = ' in text and 'report: %s' % os.path.join(out, 'report.html') in text
-    assert {'report.html', 'summary.json', 'error_model.yaml', 'z_error.png'} <= set(os.listdir(out))
-    with open(os.path.join(out, 'summary.json')) as stream:
-        assert len(json.load(stream)['z']['clusters']) == 6
-    assert read_error_model(os.path.join(out, 'error_model.yaml')).provenance.estimator == 'recorded'
 
 
 @pytest.mark.parametrize('break_it,problem', [

@@ -26,16 +26,6 @@ def test_the_error_of_a_typed_truth_is_shown_and_enter_saves_it(drive, folder):
     assert opened(folder)[1].truth_m is None and drive.window.current == 1
 
 
-@pytest.mark.parametrize('x, z, problem, field', [
-    ('12e', '2000', "X: '12e' is not a length", 'x'), ('100', '', 'Z: a length is missing', 'z')])
-def test_invalid_truth_is_reported_next_to_the_fields(drive, x, z, problem, field):
-    drive.press(x, Qt.Key_Tab, z, Qt.Key_Return)
-    truth = drive.window.pane.truth
-    assert problem in truth.hint_label.text() and drive.window.current == 0
-    assert drive.measurement(0).state == 'new' and truth.fields['z'].text() == z
-    assert truth.fields[field].hasFocus()
-
-
 @pytest.mark.parametrize('panel', [0, 1])
 def test_a_click_on_a_box_or_its_list_entry_selects_it(drive, folder, panel):
     view = drive.window.pane.images
@@ -101,25 +91,6 @@ def test_reject_asks_for_a_reason_and_restore_undoes_it(drive, folder):
     assert 'reason: moved' in drive.window.pane.header.text() and 'rejected' in drive.window.last_entry.text()
     drive.press((Qt.Key_R, CONTROL | SHIFT))
     assert opened(folder)[0].state == 'new' and drive.window.last_entry.text() == ''
-
-
-def buttons_of(dialog):
-    return {button.text().replace('&', ''): button for button in dialog.findChildren(QtWidgets.QPushButton)}
-
-
-def test_an_implausible_position_is_asked_about_and_enter_corrects_it(drive, folder):
-    def correct(dialog):
-        assert dialog.defaultButton().text() == '&Correct it'
-        dialog.defaultButton().click()
-        return dialog.informativeText()
-    drive.press('-500', Qt.Key_Tab, '2.1')
-    assert 'Implausible' in drive.window.pane.truth.hint_label.text()
-    text = drive.answer(correct, lambda: drive.press(Qt.Key_Return))
-    assert 'Z 2 mm is implausible' in text and 'Z 2100 mm would be plausible' in text
-    assert drive.measurement(0).truth_m is None and drive.window.pane.truth.fields['z'].text() == '2.1'
-    drive.answer(lambda dialog: buttons_of(dialog)['Use X −500, Z 2100 mm'].click(),
-                 lambda: drive.press(Qt.Key_Return))
-    assert opened(folder)[0].truth_m == (-0.5, None, 2.1)
 
 
 def test_boxes_are_moved_resized_and_deleted(drive, folder):

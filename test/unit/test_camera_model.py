@@ -1,12 +1,10 @@
-import operator
-
 import cv2
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 from hypothesis.extra import numpy as hnp
 
-from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, quaternion_from, transform_from, transform_points
+from ros_3d_bb.camera.camera_model import Camera, quaternion_from, transform_from
 from ros_3d_bb.camera.distortion import EQUIDISTANT, INVERSE_BROWN_CONRADY, PLUMB_BOB, RATIONAL_POLYNOMIAL
 from ros_3d_bb.camera.images import (mounted_camera, quarter_turns, turned_boxes, turned_camera, turned_image,
                                      turned_rotation, turns_for)
@@ -34,12 +32,6 @@ def test_quaternion_from_is_the_inverse_of_transform_from(quaternion):
     expected = np.array(quaternion) / np.linalg.norm(quaternion)
     assert found[3] >= 0
     np.testing.assert_allclose(found * np.sign(found.dot(expected)), expected, atol=1e-9)
-
-
-def test_optical_frame_of_a_camera_that_points_ahead():
-    """REP 103: in the body frame x is forward, y left, z up; the optical z is forward, x right, y down."""
-    body_from_optical = transform_from((0.17, 0, 0.2), OPTICAL_ROTATION)
-    np.testing.assert_allclose(transform_points(body_from_optical, [(1, 2, 3)]), [(3.17, -1, -1.8)], atol=1e-12)
 
 
 @pytest.mark.parametrize('quaternion', [(0, 0, 0, 0), (float('nan'), 0, 0, 1), (float('inf'), 0, 0, 0)])
@@ -90,11 +82,6 @@ def test_turns_of_a_mounted_camera_and_a_positive_tilt_looks_down(turns, tilt_ra
     np.testing.assert_allclose(turned_rotation(turns).dot(up), mounted_camera(1.2, tilt_rad, 0)[2, :3], atol=1e-12)
 
 
-@pytest.mark.parametrize('image_rotation, turns', [('0', 0), ('90', 1), ('180', 2), ('270', 3), ('auto', 0)])
-def test_a_given_rotation_is_used_and_an_unknown_one_is_none(image_rotation, turns):
-    assert turns_for(image_rotation, None) == turns
-
-
 # Horizontal field of view in degrees, where the camera has 640 x 480, and the lens. The first is a D435's colour
 # camera, the second a D455's, then a wide-angle lens, an Azure Kinect's, and T265's fisheye cut to 120 degrees.
 LENSES = [(55, PLUMB_BOB, (0.16, -0.5, -0.001, 0.0006, 0.47)),
@@ -121,7 +108,7 @@ def named(camera):
     return '%s-%d' % (camera.distortion_model, camera.width)
 
 
-def every_pixel(camera, step=1):
+def every_pixel(camera, step):
     """(n, 2), including the corners."""
     u, v = np.meshgrid(*(np.unique(np.append(np.arange(0, size, step), size - 1)) for size in camera[:2]))
     return np.stack((u, v), axis=-1).reshape(-1, 2).astype(float)
@@ -131,7 +118,7 @@ def every_pixel(camera, step=1):
 @pytest.mark.parametrize('camera', FOR_OPENCV, ids=named)
 def test_equals_opencv(camera):
     """Rays to 1e-6 pixels where OpenCV iterates until convergence, and pixels by its own projection."""
-    pixels = every_pixel(camera, 3)
+    pixels = every_pixel(camera, 7)
     matrix = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]])
     points, lens = camera.deproject(pixels, 1.0), np.array(camera.distortion)
     assert np.abs(camera.project(points) - pixels).max() < 1e-6
@@ -161,28 +148,6 @@ def test_pixels_next_to_the_axis_have_a_ray(camera, offset_px):
     pixel = np.array((camera.cx + offset_px, camera.cy - offset_px))
     np.testing.assert_allclose(camera.project(camera.deproject(pixel, 1.0)), pixel, rtol=0, atol=1e-9)
     assert camera.deproject(np.zeros((0, 2)), np.zeros(0)).shape == camera.project(np.zeros((0, 3))).shape[:1] + (3,)
-
-
-RADIAL = st.floats(-0.5, 0.5)
-TANGENTIAL = st.floats(-0.001, 0.001)
-BROWN = st.tuples(RADIAL, RADIAL, TANGENTIAL, TANGENTIAL, RADIAL)
-MODERATE = st.one_of(st.tuples(st.sampled_from([PLUMB_BOB, INVERSE_BROWN_CONRADY]), BROWN),
-                     st.tuples(st.just(RATIONAL_POLYNOMIAL), st.builds(
-                         operator.add, BROWN, st.tuples(*[st.floats(0, 0.5)] * 3))),
-                     st.tuples(st.just(EQUIDISTANT), st.tuples(*[st.floats(-0.1, 0.1)] * 4)))
-ANY_NUMBER = st.sampled_from([-1e5, -1, -1e-9, 0, 1e-30, 1, 1e5])
-EXTREME = st.one_of(*[st.tuples(st.just(model), st.tuples(*[ANY_NUMBER] * count)) for model, count in (
-    (PLUMB_BOB, 5), (INVERSE_BROWN_CONRADY, 5), (RATIONAL_POLYNOMIAL, 8), (EQUIDISTANT, 4))])
-
-
-@pytest.mark.slow
-@given(st.one_of(MODERATE, EXTREME), st.sampled_from(SIZES))
-def test_a_pixel_is_restored_or_has_no_ray(lens, size):
-    camera = camera_of((70,) + lens, size)
-    pixels = every_pixel(camera, 40)
-    points = camera.deproject(pixels, 1.0)
-    lost = np.isnan(points[:, 0])
-    np.testing.assert_allclose(camera.project(points)[~lost], pixels[~lost], rtol=0, atol=1e-6)
 
 
 def test_there_are_no_rays_and_images_beyond_a_fold_of_the_polynomial():

@@ -100,12 +100,6 @@ def segment_distances(points, start, end):
     return np.linalg.norm(points - start - share[:, None] * along, axis=1)
 
 
-def test_without_predictions_positions_become_less_certain_by_the_velocity():
-    track = track_at([3, 1, 0.9], [0, 0, 0], np.empty((0, 3)), covariance=np.diag([0.01, 0.01, 0, 0.04, 0.09, 0]))
-    found_m2 = covariances_after(track._replace(prediction_covariance_m2=np.empty((0, 3, 3))), [0.0, 2.0])
-    np.testing.assert_allclose(found_m2, [np.diag([0.01, 0.01, 0]), np.diag([0.17, 0.37, 0])])
-
-
 @given(random_tracks(), st.floats(0, 2))
 @settings(deadline=None, max_examples=50)
 def test_footprints_are_on_the_way_and_within_the_body(track, ahead_s):
@@ -220,15 +214,3 @@ def test_a_robot_in_the_way_pays_only_for_going_further_into_it():
     assert cost_at(presence_costs(tracks + [behind], np.eye(4), ROBOT_RADIUS_M), 1.0, 0.3) == HIGHEST
     two_m_beside = presence_costs(tracks, transform_from((0, 2, 0), (0, 0, 0, 1)), ROBOT_RADIUS_M)
     assert cost_at(two_m_beside, 0.0, 2.0) > HIGHEST / 2 and cost_at(two_m_beside, 1.0, 2.3) == HIGHEST
-
-
-def test_positions_and_covariances_are_transformed_to_the_robot_frame():
-    """The robot stands at (3, 1) and looks along y of the tracks; the position is uncertain along x only."""
-    track = walking((3.0, 3.0), (0.0, 0.0), (0.0, 0.0))
-    uncertain = np.diag([1.0, 0.0, 0.0])
-    track.covariance[:3, :3] = track.prediction_covariance_m2[:] = uncertain
-    robot_from_tracks = np.linalg.inv(transform_from((3, 1, 0), (0, 0, np.sin(np.pi / 4), np.cos(np.pi / 4))))
-    costs = presence_costs([track], robot_from_tracks, ROBOT_RADIUS_M)
-    assert cost_at(costs, 2.0, 0.0) > 0
-    assert cost_at(costs, 2.0, 1.5) > 0 and cost_at(costs, 2.0, -1.5) > 0
-    assert cost_at(costs, 3.5, 0.0) == cost_at(costs, 0.5, 0.0) == 0

@@ -15,7 +15,7 @@ from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_pa
 from ros_3d_bb_lab.evaluation.scene_benchmark import (RANGE_M, detector_in, detections_without_scores,
                                                       exact_detector, result_of, run_scene, score_detections,
                                                       yolov5_detector)
-from ros_3d_bb_lab.simulation.scenario import read_scenario, scenario_from
+from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import Simulator
 
 REAL_WEIGHTS = pytest.mark.needs(*['torch'] * bool(DATA))
@@ -107,22 +107,3 @@ def test_a_person_too_near_for_the_weight_free_detector_stays_tracked(approach):
             ids.add(track.id)
             assert plane_distances([person.position_m], [track.position_m]) < 0.5
     assert len(ids) == 1
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('seed', range(4))
-def test_a_robot_that_drives_up_to_a_person_keeps_the_track(seed):
-    """The camera of a Jackal. From 1.6 m on, where the image shows legs alone, the detector misses them."""
-    simulator = Simulator(scenario_from({
-        'duration': 7.0, 'rate': 10.0, 'seed': seed, 'people': [{'start': [4.0, 0.05], 'facing': 1.5 * seed}],
-        'robot': {'moves': [{'wait': 1.0}, {'to': [2.9, 0.0], 'speed': 0.7}, {'wait': 4.0}]}}))
-    exact, none = exact_detector(simulator), detections_without_scores([])
-
-    def distance_m(frame):
-        return plane_distances([frame.people[0].position_m], [frame.poses.map_from_camera[:3, 3]])
-
-    steps = run_scene(simulator, lambda frame: exact(frame) if distance_m(frame) > 1.6 else none)
-    assert distance_m(steps[-1].frame) < 1.1
-    for step in steps[5:]:
-        track, = step.moment.tracks
-        assert plane_distances([step.frame.people[0].position_m], [track.position_m]) < 0.3

@@ -9,7 +9,7 @@ from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.sessions.burst import Burst
 from ros_3d_bb.sessions.snapshots import ColorImage, Snapshot, Snapshots
 from ros_3d_bb.visualization.cv_window import character_of
-from ros_3d_bb.visualization.image_overlay import BOX_COLOR, colorize_depth
+from ros_3d_bb.visualization.image_overlay import colorize_depth
 from ros_3d_bb.visualization.viewer_layout import compose
 
 BOX = Box3D(np.array([0.5, -0.25, 2.0]), np.array([0.5, 1.75, 0.5]), (100, 40, 200, 160), 0.75,
@@ -31,13 +31,6 @@ def test_three_panels_are_side_by_side(width_px):
     assert picture[row, column].tolist() == picture[row, column + 2 * width_px].tolist() == [10, 20, 30]
     depth = colorize_depth(np.full((1, 1), 255 - int(254 * 1.5 / 6.0), np.uint8))[0, 0].astype(int)
     assert np.abs(picture[row, column + width_px] - depth).max() <= 8
-
-
-def test_boxes_are_drawn_in_the_third_panel_only():
-    picture = compose(view(), 320, 6.0)
-    assert picture[100, 640 + 100].tolist() == list(BOX_COLOR)
-    for panel in range(2):
-        assert not (picture[:240, 320 * panel:320 * (panel + 1)] == BOX_COLOR).all(axis=2).any()
 
 
 WITH_SHIFT = 1 << 16  # GTK's state of modifiers
@@ -75,14 +68,6 @@ def test_parts_are_combined_in_any_order(order):
     assert snapshots.newest is None
     send(snapshots, 7, order)
     assert snapshots.newest[:6] == (7 * PERIOD, 7, 7, 7, 7, 7)
-
-
-def test_3d_boxes_have_the_stamp_of_the_depth_image():
-    snapshots, depth_ns = made(), 7 * PERIOD + 4 * MS
-    send(snapshots, 7, ('color', 'camera', 'boxes2d'))
-    snapshots.add_depth(depth_ns, 0, 'depth')
-    snapshots.add_boxes3d(depth_ns, 0, 'boxes3d')
-    assert snapshots.newest[:6] == (7 * PERIOD, 7, 'depth', 7, 7, 'boxes3d')
 
 
 def test_the_newest_images_are_returned_without_boxes_that_are_late():
