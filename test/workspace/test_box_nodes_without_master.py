@@ -21,7 +21,6 @@ from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.detector_node import DetectorNode
 from ros_3d_bb.nodes.viewer_node import ViewerNode
-from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb.visualization.image_overlay import VALID_COLOR
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
@@ -67,12 +66,6 @@ def test_boxes_without_a_stamp_get_the_image_that_arrived_before_them(connection
     connections.send(BOXES_TOPIC, Int32MultiArray(data=[20, 10, 44, 38]))
     message = connections.publishers[BOXES3D_TOPIC].newest
     assert message.header.stamp == time_from(stamp_ns) and message.boxes[0].center.position.z == pytest.approx(2.0)
-
-
-def test_a_changed_estimator_is_used_from_the_next_image(connections):
-    connections.node._reconfigure(Bbox3dParams(estimator='foreground'))
-    send_image(connections, START_NS)
-    assert 2.05 < connections.publishers[BOXES3D_TOPIC].newest.boxes[0].center.position.z < 2.15  # the axis
 
 
 def test_debug_images_are_published_while_they_have_subscribers(connections):
@@ -207,15 +200,3 @@ def test_captures_are_appended_and_an_image_is_stored_once(viewer):
         np.testing.assert_array_equal(read_depth(frame, session).values, imgmsg_to_depth(messages[DEPTH_TOPIC]).values)
         assert frame.boxes_px == ((26, 8, 38, 44),)
         np.testing.assert_allclose([detection.estimate_m for detection in frame.detections], [[0.5, 0.1, 3.0]])
-
-
-def test_images_without_boxes_are_stored_after_a_warning(viewer):
-    for number in range(12):
-        messages = good_messages(START_NS + number * NS // 10)
-        del messages[BOXES_TOPIC], messages[BOXES3D_TOPIC]
-        send_image(viewer, START_NS + number * NS // 10, messages)
-    is_stored, answer = viewer.node.capture()
-    assert not is_stored and 'no 3D boxes received on /ros_3d_bb/bb_3d' in answer
-    assert viewer.node.capture()[0]
-    stored, = read_session(viewer.folder).frames
-    assert stored.stamp_ns == START_NS + 11 * NS // 10 and stored.detections == ()

@@ -1,8 +1,7 @@
 import pytest
 
-from ros_3d_bb.conversions.perception_msgs import stamp_of
 from ros_3d_bb.core.time_sync import NS
-from support.two_cameras import PERIOD_NS, START_NS, Play, Rig
+from support.two_cameras import Play
 
 HOUR_NS = 3600 * NS
 RECOVERY_NS = 2 * NS
@@ -47,25 +46,6 @@ def test_a_single_camera_continues_after_one_stamp_of_the_future(ahead_ns):
     assert play.counts.get(BACK, 0) == (ahead_ns == HOUR_NS) and len(play.ids) == 1
     shown = [now_ns for now_ns, _camera, result in play.results if result and result.tracks and now_ns > begun_ns]
     assert min(shown) - begun_ns < NS // 2
-
-
-@pytest.fixture
-def rig():
-    return Rig('front', 'rear')
-
-
-def test_time_jumps_back_once_if_all_cameras_do(rig):
-    """A bag loops; the rear camera's detector takes longer. Tracks begin once more, and once only."""
-    def send(number, camera):
-        rig.now_ns = number * PERIOD_NS
-        return rig.send(START_NS + number % 200 * PERIOD_NS, camera)
-    for number in range(200):
-        assert send(number, 'front') and (number < 3 or send(number - 3, 'rear'))
-    for number in range(200, 220):
-        front, rear = send(number, 'front'), send(number - 3, 'rear')
-        assert rear and (front is None) == (number <= 203)
-    assert rig.events.counts['jumps back in time'] == 1 and rig.events.counts['images behind other cameras'] == 4
-    assert [track.id for track in front.tracks] == [2] and stamp_of(rear) == START_NS + 19 * PERIOD_NS
 
 
 def leaps_once(play, ahead_ns):

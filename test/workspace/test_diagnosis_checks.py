@@ -12,7 +12,7 @@ from ros_3d_bb.diagnosis.camera_mount import CameraMount
 from ros_3d_bb.diagnosis.checks import findings
 from ros_3d_bb.diagnosis.observations import Newest, Observations, Publisher, Role, Stream, TfSeen
 from ros_3d_bb.diagnosis.roles import BOXES2D, BOXES3D, COLOR, DEPTH, INFO, TRACKS
-from ros_3d_bb.diagnosis.tf_tree import Link, links_in
+from ros_3d_bb.diagnosis.tf_tree import Link
 
 IMAGE, CAMERA = 'sensor_msgs/Image', Camera(640, 480, 600, 600, 320, 240)
 STAMPS = tuple(1000 * NS + number * NS // 10 for number in range(50))
@@ -208,10 +208,3 @@ def test_a_fault_of_a_bag_is_reported_with_its_fix(seen, fault, fix):
 def test_units_are_checked_by_the_depth_of_most_pixels(values, scale_m, fault):
     found = units_fault(DepthImage(values, scale_m))
     assert fault in found and bool(fault) == bool(found)
-
-
-def test_links_are_parsed_from_the_text_of_tf2():
-    text = ("odom: \n  parent: 'map'\n  broadcaster: 'me'\n  rate: 10000.000\n  most_recent_transform: 100.500\n"
-            '  oldest_transform: 99.000\n  buffer_length: 1.500\n')
-    assert links_in(text) == {'odom': Link('map', 99.0, 100.5)}
-    assert links_in('') == links_in('[]') == links_in('*: {') == {}

@@ -33,7 +33,6 @@ def base_from(frame, description):
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 CAMERA_POSITION = (0.17, 0.0, 0.20)  # in base_link, thesis 3.5.1
-FX, WIDTH, HEIGHT = 614.686, 640, 480  # camera_info of the D435i of the thesis
 
 
 @pytest.fixture
@@ -73,17 +72,6 @@ def test_gazebo_publishes_the_topics_of_the_pipeline(robot):
     sensor_frame = description.find('.//sensor/..').get('reference')
     np.testing.assert_allclose(base_from(sensor_frame, description)[:3, 3],
                                base_from(plugin.findtext('frameName'), description)[:3, 3])
-
-
-def test_the_simulated_camera_has_the_intrinsics_of_the_real_one(robot):
-    assert robot().findtext('.//sensor/update_rate') == '30'
-    sensor = robot(d435i_rate='15').find('.//sensor')
-    width, height = (int(sensor.findtext('camera/image/' + key)) for key in ('width', 'height'))
-    assert (width, height, sensor.findtext('update_rate')) == (WIDTH, HEIGHT, '15')
-    assert width / 2 / np.tan(float(sensor.findtext('camera/horizontal_fov')) / 2) == pytest.approx(FX, rel=1e-3)
-    cutoffs = [float(sensor.findtext('plugin/pointCloudCutoff' + end)) for end in ('', 'Max')]
-    near, far = (float(sensor.findtext('camera/clip/' + key)) for key in ('near', 'far'))
-    assert near <= cutoffs[0] < cutoffs[1] <= far
 
 
 def test_the_launch_file_starts_gazebo_the_robot_and_the_pipeline(tmp_path):

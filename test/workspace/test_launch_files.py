@@ -1,6 +1,6 @@
 """Parameters, nodes and topics that launch files set for their arguments, with stand-ins for realsense2_camera.
 
-test_package.py loads each launch file, test_camera_mount.py those with the pose of a camera. test/nodes/navigation.test
+test_pages.py loads each launch file, test_camera_mount.py those with the pose of a camera. test/nodes/navigation.test
 runs navigation.launch with the planners.
 """
 import ast

@@ -149,11 +149,6 @@ def test_an_unusable_3d_box_does_not_affect_the_others(wrong):
     assert [(detection.index, detection.position_m[0]) for detection in detections] == [(0, -1.0), (2, 2.0)]
 
 
-@pytest.mark.parametrize('label, expected', [('Pedestrian', 'person'), ('Person', 'person'), ('dog', 'dog')])
-def test_people_of_other_packages_are_people(label, expected):
-    assert detection_of(box_of(label=label)).label == expected
-
-
 def test_detections_are_upright_in_the_fixed_frame():
     """Width and depth of the cylinder are horizontal, its height is z; covariances are rotated."""
     detection = detection_of(box_of(0.6, 1.8, 0.5, 0.1, covariance_m2=np.diag([0.01, 0.04, 0.09])))

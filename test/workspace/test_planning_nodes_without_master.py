@@ -206,15 +206,6 @@ def test_a_robot_with_a_pose_of_another_time_stands(age_s, expected):
         assert robot.forwarded(now_ns) == 1.0
 
 
-def test_static_transforms_and_those_between_equal_frames_do_not_age():
-    with robot_with() as robot:
-        robot.send_tf(START_NS, '/tf_static')
-        assert robot.forwarded(START_NS + 600 * NS) == 1.0
-    with robot_with() as robot:
-        robot.send_tf(START_NS)
-        assert robot.forwarded(START_NS + 600 * NS, frame_id='/base_link') == 1.0
-
-
 def test_the_robot_has_moved_on_since_its_latest_pose():
     """The person leaves 1.5 m: 0.25 m of the body, and the robot and the clearance, of 2.2 m."""
     standing = track_at([2.2, 0, 0.9], [0, 0, 0], moving=False)
@@ -234,18 +225,6 @@ def test_the_robot_stops_before_the_whole_length_of_a_bicycle():
         robot.forwarded(START_NS, bicycle)
         speed_mps = robot.limit()
         assert 1.0 < 0.3 * speed_mps + speed_mps ** 2 / 2 <= 1.175
-
-
-@pytest.mark.parametrize('range_m, expected', [(5.0, 2.0), (0.0, 0.3), (np.nan, 0.3)])
-def test_a_scan_without_information_limits_the_speed_as_no_scan_does(range_m, expected):
-    with masterless({'use_scan': True}) as connections:
-        robot, connections.now = Robot(connections), time_from(START_NS)
-        robot.send_tf(START_NS)
-        connections.send('scan', LaserScan(
-            header=Header(stamp=connections.now, frame_id='base_link'), angle_min=-1.5, angle_increment=0.01,
-            range_min=0.1, range_max=10.0, ranges=[range_m] * 301))
-        robot.forwarded(START_NS)
-        assert robot.limit() == pytest.approx(expected) and ('scans rejected' in robot.counts) == (expected < 2)
 
 
 def goals_sent(distance_m, seconds):

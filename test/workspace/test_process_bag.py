@@ -95,14 +95,6 @@ def test_without_detector_the_boxes_in_the_bag_are_used(session_bag, tmp_path):
         assert len(boxes3d.boxes) == len(boxes2d.data) // 4
 
 
-def test_names_without_a_slash_are_those_of_the_nodes(scene, tmp_path):
-    """rosbag record stores the names of topics as they are given on its command line."""
-    recorded = changed_bag(scene, tmp_path / 'in.bag', lambda topic, *rest: (topic[1:],) + rest)
-    process_bag(scene, str(tmp_path / 'expected.bag'), DEPTH)
-    process_bag(recorded, str(tmp_path / 'out.bag'), DEPTH)
-    assert messages_in(tmp_path / 'out.bag') == messages_in(tmp_path / 'expected.bag')
-
-
 def test_topics_can_be_remapped_and_a_missing_one_is_named(scene, tmp_path):
     renamed = changed_bag(scene, tmp_path / 'in.bag', lambda topic, *rest: (
         topic.replace('/camera/', '/front/'),) + rest)
