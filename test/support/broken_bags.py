@@ -68,16 +68,15 @@ def in_frame(frame_id):
 
 
 def with_frames(names):
-    """Rename frames everywhere; a link from or to the name None is removed."""
+    """Rename frames everywhere."""
     def changed(topic, message, time):
         message = copy.deepcopy(message)
         if topic == '/tf':
             for link in message.transforms:
                 link.header.frame_id = names.get(link.header.frame_id, link.header.frame_id)
                 link.child_frame_id = names.get(link.child_frame_id, link.child_frame_id)
-            message.transforms = [link for link in message.transforms if link.header.frame_id and link.child_frame_id]
         elif topic in IMAGES + (TRUTH,):
-            message.header.frame_id = names.get(message.header.frame_id, message.header.frame_id) or ''
+            message.header.frame_id = names.get(message.header.frame_id, message.header.frame_id)
         return topic, message, time
     return changed
 

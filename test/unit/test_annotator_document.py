@@ -2,8 +2,6 @@ import csv
 import os
 import re
 
-import cv2
-import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
@@ -103,17 +101,6 @@ def test_a_box_drawn_by_hand_is_estimated_and_chosen(document, folder):
     assert read_session(folder).frames[0].boxes_px == (NEAR_BOX, FAR_BOX)
 
 
-@pytest.mark.parametrize('break_it', [
-    lambda document: os.remove(document.measurements[0].depth_path),
-    lambda document: cv2.imwrite(document.measurements[0].depth_path, np.zeros((48, 64), np.uint16))])
-def test_truth_can_be_entered_for_a_box_that_cannot_be_estimated(document, folder, break_it):
-    change_json(folder, lambda content: content['frames'][0]['detections'][0].pop('estimate_mm'))
-    document.refresh()
-    break_it(document)
-    document.set_truths([0], 0.1, 2.0)
-    assert document.measurements[0].truth_m == (0.1, None, 2.0) and document.known_errors(0) is None
-
-
 def test_a_missing_image_is_named_and_other_measurements_can_be_annotated(folder):
     os.remove(os.path.join(folder, 'depth', 'm1.png'))
     os.remove(os.path.join(folder, 'color', 'm1.png'))
@@ -126,14 +113,6 @@ def test_a_missing_image_is_named_and_other_measurements_can_be_annotated(folder
     document.reject([1], 'no images')
     document.set_truths([2], -0.5, 2.1)
     assert list(problems_of(document)) == []
-
-
-@pytest.mark.parametrize('share', [0, 0.5, 0.99])
-def test_a_truncated_image_is_named(folder, share):
-    path = os.path.join(folder, 'depth', 'm1.png')
-    os.truncate(path, int(share * os.path.getsize(path)))
-    assert [measurement.problem for measurement in Document(folder).measurements] == [
-        None, 'the end of depth/m1.png is missing', None, None]
 
 
 @pytest.mark.parametrize('break_it,problem', [

@@ -8,7 +8,6 @@ from ros_3d_bb.estimation import box3d_estimator, depth_samples
 from ros_3d_bb_lab.evaluation import __main__ as command
 from ros_3d_bb_lab.evaluation.ablation.benchmark import MECHANISMS, Mechanism, ablate, check
 from ros_3d_bb_lab.evaluation.navigation.navigation_scenes import DURATION_S, SCENES, scenario_of
-from ros_3d_bb_lab.evaluation.navigation.trial_result import summary
 from ros_3d_bb_lab.evaluation.tracking.recorded_detections import read_recordings
 from ros_3d_bb_lab.evaluation.video.recording import Person, read_truth, read_video
 from ros_3d_bb_lab.evaluation.video.scores import compare
@@ -21,7 +20,7 @@ FORWARD = '-0.5,0.5,-0.5,0.5'  # the camera looks along x of the fixed frame
 SPEED_MPS, CAMERA_MPS, IMAGES = 0.5, 1.0, 31
 
 
-def write_recording(folder, scores='0.9', ignored=''):
+def write_recording(folder, ignored=''):
     """A camera that drives along x, 10 images a second; a person ahead, and one who does not count at the side."""
     folder.mkdir()
     (folder / 'camera.json').write_text(json.dumps(CAMERA))
@@ -31,7 +30,7 @@ def write_recording(folder, scores='0.9', ignored=''):
     for number in range(IMAGES):
         time_s, camera_m, person_m = number / 10.0, CAMERA_MPS * number / 10.0, 8 + SPEED_MPS * number / 10.0
         tables['poses'].append('%.1f,%g,0,1,%s' % (time_s, camera_m, FORWARD))
-        tables['detections'].append('%.1f,0,0,%g,0.5,1.7,%s' % (time_s, person_m - camera_m, scores))
+        tables['detections'].append('%.1f,0,0,%g,0.5,1.7,0.9' % (time_s, person_m - camera_m))
         tables['truth'] += ['%.1f,7,%g,0,1,0.5,1.7,1' % (time_s, person_m), '%.1f,8,10,2,1,0.5,1.7,0' % time_s]
         tables['ignored'] += ['%.1f,%s' % (time_s, ignored)] if ignored else []
     for name, lines in tables.items():
@@ -118,11 +117,6 @@ def test_an_invalid_truth_is_named(video_folder, tmp_path, content):
         read_truth(str(tmp_path / 'truth.json'), read_video(video_folder))
 
 
-def trial(**others):
-    return dict({'scene': 'crowd', 'mode': 'ours', 'collisions': 0, 'collisions_driving': 0, 'time_to_goal_s': 10.0,
-                 'min_distance_m': 0.5, 'stops': 0}, **others)
-
-
 @pytest.mark.parametrize('name', sorted(SCENES))
 def test_scenes_are_valid_and_depend_on_the_seed_only(name):
     contents = [scenario_of(name, seed) for seed in range(1, 21)]
@@ -131,13 +125,6 @@ def test_scenes_are_valid_and_depend_on_the_seed_only(name):
     for content in contents:
         scenario = scenario_from(content)
         assert scenario.duration == DURATION_S and len(scenario.people) >= 1
-
-
-def test_the_summary_of_trials():
-    trials = [trial(), trial(collisions=2, collisions_driving=1, time_to_goal_s=None, min_distance_m=-.1, stops=3)]
-    assert summary(trials) == {'runs': 2, 'collisions': 2, 'collisions_driving': 1, 'runs_with_collisions': 1,
-                               'reached': 1, 'time_to_goal_s': 10.0, 'min_distance_m': -.1, 'stops': 1.5}
-    assert summary(trials[1:])['time_to_goal_s'] is None
 
 
 @pytest.mark.parametrize('mechanism', MECHANISMS, ids=lambda mechanism: mechanism.name)

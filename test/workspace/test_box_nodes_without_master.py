@@ -11,14 +11,14 @@ from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOP
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, boxes2d_from_msg, boxes3d_to_msg,
                                                    stamp_of, time_from)
+from ros_3d_bb.core.detection_pace import WINDOW
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
-from ros_3d_bb.detection.detector import DetectorParams
 from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
+from ros_3d_bb.nodes.common import detector_output
 from ros_3d_bb.nodes.detector_node import DetectorNode
 from ros_3d_bb.nodes.viewer_node import ViewerNode
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
@@ -26,7 +26,7 @@ from ros_3d_bb.visualization.image_overlay import VALID_COLOR
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
-from support.inputs import CAMERA, good_messages, send_image
+from support.inputs import CAMERA, TARGETS, good_messages, send_image
 from support.launching import loaded
 from support.masterless import masterless
 from support.ros import depth_message, header_at
@@ -85,13 +85,12 @@ def test_debug_images_are_published_while_they_have_subscribers(connections):
 PEOPLE = [{'start': [4.0, 0.8], 'facing': 3.1, 'height': 1.8}, {'start': [5.0, -0.9], 'facing': 1.6, 'height': 1.7}]
 
 
-def answer(frame_id='camera_color_optical_frame', changed=DepthPeopleParams(), **scenario):
+def answer(frame_id='camera_color_optical_frame', **scenario):
     """The boxes and the annotated image of one image, the counts of the node, and the true boxes."""
     simulator = Simulator(scenario_from(dict({'rate': 10.0, 'people': PEOPLE}, **scenario)))
     frame = simulator.frame(0)
     with masterless({'detector': 'depth'}) as connections:
         node = DetectorNode()
-        node._reconfigure(DetectorParams(), changed)
         for topic, message in simulated_messages(simulator, frame, START_NS):
             topic = '/tf' if topic == 'tf' else topic
             if topic != '/tf':
@@ -170,6 +169,24 @@ def test_the_service_pauses_and_changed_parameters_apply_to_later_images(camera,
     with pytest.raises(ValueError, match='unicorn'):
         node._reconfigure(node.params, DetectionParams(confidence=1.0, classes=['unicorn']), RuntimeParams())
     assert len(sent(camera, image[0]).boxes) == 1
+
+
+def test_a_slow_network_gets_smaller_images_as_the_range_permits_and_then_fewer_at_a_steady_rate():
+    """All detections take 50 ms, at 30 Hz."""
+    clock = mock.Mock(monotonic=mock.Mock(side_effect=np.arange(0, 1000, 0.05)))
+    with masterless({'weights': 'blind.pt'}) as connections, mock.patch.object(detector_output, 'time', clock):
+        node, sizes, stamps_ns = TARGETS['detector_node yolov5'].make(), [], []
+        for number in range(4 * WINDOW):
+            messages = good_messages(START_NS + number * NS // 30)
+            for topic in (INFO_TOPICS[0], COLOR_TOPIC):
+                connections.send(topic, messages[topic])
+            sizes.append(node._worker.pace.size)
+            stamps_ns.append(newest(connections).stamp_ns)
+    assert [sizes[count * WINDOW - 1] for count in (1, 2, 3)] == [448, 384, 384]  # 320 is too small for 8 m
+    assert set(np.diff(stamps_ns[:3 * WINDOW])) <= {NS // 30, NS // 30 + 1}
+    assert len(set(stamps_ns[3 * WINDOW - 1:])) == 1 + WINDOW // 2
+    assert node._diagnostics.counts['changes of image size or rate'] == 3
+    assert node._diagnostics.counts['images skipped for a steady rate'] == WINDOW - WINDOW // 2
 
 
 @pytest.fixture

@@ -53,8 +53,8 @@ class Estimation(object):
     def add_depth(self, depth, header=HEADER, encoding='32FC1'):
         self._source.add_depth(fill_image(Image(header=header), depth, encoding), 0)
 
-    def add_boxes(self, rects_px, labels=None, scores=None, header=HEADER, image_size=None, color=None):
-        self._source.add_boxes(boxes2d_to_msg(np.array(rects_px), header, labels, scores, image_size), 0, color)
+    def add_boxes(self, rects_px, labels=None, scores=None, header=HEADER, image_size=None):
+        self._source.add_boxes(boxes2d_to_msg(np.array(rects_px), header, labels, scores, image_size), 0)
 
 
 def test_without_floor_frame_the_tilt_is_that_in_the_root_of_tf(events):

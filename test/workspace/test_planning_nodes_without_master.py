@@ -27,8 +27,8 @@ STAMP_NS = 1000 * NS
 
 
 @contextlib.contextmanager
-def node_with(inputs, *people, age_ns=NS // 10, names=(), **params):
-    with masterless(dict(params, inputs=inputs, tf_timeout=0.0), names) as connections:
+def node_with(inputs, *people, age_ns=NS // 10, **params):
+    with masterless(dict(params, inputs=inputs, tf_timeout=0.0)) as connections:
         node = PeopleRemovalNode()
         connections.now = time_from(STAMP_NS)
         connections.send('/tf', transforms(STAMP_NS))
