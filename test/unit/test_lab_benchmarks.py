@@ -4,10 +4,12 @@ import os
 import numpy as np
 import pytest
 
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation import box3d_estimator, depth_samples
 from ros_3d_bb_lab.evaluation import __main__ as command
 from ros_3d_bb_lab.evaluation.ablation.benchmark import MECHANISMS, Mechanism, ablate, check
 from ros_3d_bb_lab.evaluation.navigation.navigation_scenes import DURATION_S, SCENES, scenario_of
+from ros_3d_bb_lab.evaluation.navigation.trial_result import Pace
 from ros_3d_bb_lab.evaluation.tracking.recorded_detections import read_recordings
 from ros_3d_bb_lab.evaluation.video.recording import Person, read_truth, read_video
 from ros_3d_bb_lab.evaluation.video.scores import compare
@@ -141,3 +143,19 @@ def test_a_mechanism_is_off_wherever_it_is_imported_and_on_again_afterwards():
     assert ablate([reaches_mm, reaches_mm], [mechanism]) == {
         '': {key: 2 * value for key, value in before_mm.items()}, 'reach of a body': {'here': 14, 'there': 14}}
     assert reaches_mm() == before_mm
+
+
+LEAD_NS = int(Pace.LEAD_S * NS)
+
+
+def test_time_waits_for_the_slowest_source():
+    pace = Pace()
+    pace.heard('cloud', 1 * NS)
+    pace.start(5 * NS, ['commands', 'tracks'])
+    assert pace.sources == {'cloud', 'commands', 'tracks'}
+    assert pace.new_limit(100.0) == 5 * NS + LEAD_NS
+    pace.heard('commands', 7 * NS)
+    assert pace.new_limit(100.1) is None
+    pace.heard('tracks', 6 * NS)
+    assert pace.new_limit(100.2) == 6 * NS + LEAD_NS
+    assert pace.late == 0

@@ -4,7 +4,7 @@ from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from, transform_points
 from ros_3d_bb.camera.images import DepthImage
-from ros_3d_bb.planning.cost_grid import ACROSS, CELL_M, COMFORT_M, HALF_SIZE_M, HIGHEST, RISKY, presence_costs
+from ros_3d_bb.planning.cost_grid import CELL_M, COMFORT_M, HALF_SIZE_M, HIGHEST, presence_costs
 from ros_3d_bb.planning.people_removal import are_inside, cylinders_of, pixels_inside, scan_parts
 from ros_3d_bb.planning.planner_view import (covariances_after, footprint_points, in_frame, position_after,
                                              predicted_to, usable_tracks, with_usable_covariances)
@@ -189,19 +189,6 @@ def test_certain_predictions_cost_most_along_the_way_and_nothing_beside():
         assert cost_at(costs, 1.0, y_m) == HIGHEST
         assert cost_at(costs, 1.0 + 2 * RADIUS_M, y_m) == cost_at(costs, 1.0 - 2 * RADIUS_M, y_m) == 0
     assert cost_at(costs, 1.0, 1.0 + 2 * RADIUS_M) == cost_at(costs, 1.0, -2.0 - 2 * RADIUS_M) == 0
-
-
-def test_costs_follow_the_probability_of_presence():
-    """Against the share of samples of the predicted position that cover the cell, where that varies slowly."""
-    track = walking((2.0, 0.0), (1.0, 0.0), (0.8, 0.8))
-    for covariances_m2 in (track.covariance, track.prediction_covariance_m2):
-        covariances_m2[..., 1, 1] /= ACROSS ** 2
-    costs = presence_costs([track], np.eye(4), ROBOT_RADIUS_M)
-    offsets = np.random.RandomState(3).normal(scale=0.8, size=(200000, 2))
-    for x_m, y_m in ((3.05, 0.05), (3.05, 0.95), (3.05, -1.55)):
-        nearest_m = min(4.0, max(2.0, x_m))
-        expected = (np.hypot(*(offsets + [nearest_m - x_m, -y_m]).T) < RADIUS_M).mean()
-        assert cost_at(costs, x_m, y_m) / float(HIGHEST) * RISKY == pytest.approx(expected, abs=0.02)
 
 
 def test_a_robot_in_the_way_pays_only_for_going_further_into_it():

@@ -6,7 +6,7 @@ from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE
 from ros_3d_bb_lab.simulation.driven_world import COMMAND_TIMEOUT_S, DrivenWorld
 from ros_3d_bb_lab.simulation.scenario import Furniture, Move, Person, Room, Scenario
-from ros_3d_bb_lab.simulation.sensors import StereoCamera, StereoParams
+from ros_3d_bb_lab.simulation.sensors import StereoCamera
 from ros_3d_bb_lab.simulation.simulator import STEP_S, Simulator
 
 CAMERA = Camera(160, 120, 153.7, 153.7, 79.8, 60.5)
@@ -137,7 +137,6 @@ def test_people_give_way_to_the_robot(moves, start):
 
 LEVEL_MM = 610140.  # depth levels are this divided by an integer
 STEPS_PER_PX = 32
-NO_NOISE = StereoParams(noise_px=0, white_noise_px=0, jitter_px=0, hole_share=0)
 STEREO_CAMERA = Camera(400, 60, 614.686, 614.842, 200, 30)
 
 
@@ -145,19 +144,6 @@ def inverse_depth(depth_m, camera=STEREO_CAMERA):
     """Inverse depth image of depth in metres, which is broadcast to the image."""
     return np.ascontiguousarray(np.broadcast_to(1 / np.asarray(depth_m, float), (camera.height, camera.width)),
                                 dtype=np.float32)
-
-
-@pytest.mark.parametrize('params', [StereoParams(), NO_NOISE])
-def test_shadow_follows_the_formula(params):
-    """Of a plate in front of a wall."""
-    stereo = StereoCamera(STEREO_CAMERA, params=params)
-    for near_m, wall_m in ((0.5, 8), (1, 2), (1, 8), (2, 3), (4, 8)):
-        depth_m = np.full(STEREO_CAMERA.width, wall_m, float)
-        depth_m[200:300] = near_m
-        depth_mm = stereo.measure(inverse_depth(depth_m), 0)
-        shadow_px = 0.0606 * STEREO_CAMERA.fx * (1 / near_m - 1 / wall_m) + 4
-        assert np.median((depth_mm[:, 100:200] == 0).sum(axis=1)) == pytest.approx(shadow_px, abs=2.5)
-        assert np.mean(depth_mm[:, 300:] == 0) < 0.01
 
 
 def test_noise_of_depth_grows_with_its_square():

@@ -109,19 +109,6 @@ def test_boxes_before_their_depth_image_wait_for_it_with_a_long_tolerance(depth_
     assert recorder.frames[1:] == [(n, n, 'camera') for n in range(1, 20)]
 
 
-@pytest.mark.parametrize('ahead_ns, dropped', [(0, []), (3 * NS, [28, 29]), (1500 * MS, [28, 29])])
-def test_boxes_from_before_a_jump_ahead_are_no_fault_of_the_detector(ahead_ns, dropped):
-    """As where a simulated scene starts again: the depth images from before are no longer cached."""
-    recorder = Recorder()
-    recorder.add('camera', None, 0, 'camera')
-    arrivals = [(n * PERIOD + delay_ns, kind, n) for n in range(60) for kind, delay_ns in (('depth', 0),
-                                                                                           ('boxes', 90 * MS))]
-    for now_ns, kind, number in sorted(arrivals):
-        recorder.add(kind, number * PERIOD + (ahead_ns if number >= 30 else 0), now_ns, number)
-    assert recorder.dropped == dropped
-    assert recorder.frames == [(n, n, 'camera') for n in range(60) if n not in dropped]
-
-
 @pytest.fixture
 def recorder():
     """With the camera of image 0 and nothing else."""

@@ -10,7 +10,7 @@ import pytest
 import rosbag
 from std_msgs.msg import Header
 
-from ros_3d_bb.bags.bag_writer import START_NS, session_images, session_to_bag, write_bag
+from ros_3d_bb.bags.bag_writer import START_NS, session_images, write_bag
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, boxes2d_to_msg, camera_from_msg, time_from,
                                                    tracks_from_msg, tracks_to_msg)
@@ -70,11 +70,6 @@ def run_tool(monkeypatch, capsys, tmp_path):
             status = error.code
         return status, ''.join(capsys.readouterr())
     return run
-
-
-def test_a_session_is_written_without_boxes_by_default(folder, run_tool):
-    assert run_tool(session_to_bag, folder, 'out.bag', '--rate', '15') == (0, 'out.bag: 4 images\n')
-    assert '/yolo_bounding_box' not in messages_in('out.bag')
 
 
 SCENE = {'duration': 0.5, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}],

@@ -3,10 +3,13 @@ import os
 import signal
 import subprocess
 import sys
+from unittest import mock
 
 import pytest
 
+from ros_3d_bb_lab.evaluation.latency.latency_probe_node import LatencyProbeNode
 from support.bags import scene_bag
+from support.masterless import masterless
 from support.processes import processes_naming
 from support.real_planners import planner_environment
 
@@ -51,3 +54,16 @@ def test_results_are_written_and_no_process_remains(tmp_path):
     assert case['pipeline']['cpu_percent'] == pytest.approx(
         case['cpu_percent']['bbox3d_node'] + case['cpu_percent']['tracker_node'])
     assert processes_naming(str(tmp_path)) == 0
+
+
+@pytest.mark.parametrize('checks', [0, 1, 2])
+def test_a_latency_probe_that_is_shut_down_early_writes_no_record(tmp_path, checks):
+    """Before the first markers, in the time of warming up, and while it measures."""
+    module, answers = 'ros_3d_bb_lab.evaluation.latency.latency_probe_node.', [False] * checks
+    with masterless({'record': str(tmp_path / 'record.json')}), mock.patch('time.sleep'), \
+            mock.patch(module + 'pids_of_nodes', lambda: {'self': os.getpid()}), \
+            mock.patch('rospy.is_shutdown', lambda: answers.pop() if answers else True):
+        node = LatencyProbeNode()
+        node._arrivals['markers'].extend([(0, 0)] * checks)
+        node.measure()
+    assert os.listdir(str(tmp_path)) == [] and not answers

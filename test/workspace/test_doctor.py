@@ -10,6 +10,7 @@ from sensor_msgs.msg import Image
 
 from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.conversions.camera_msgs import transform_messages
+from ros_3d_bb.conversions.image_msgs import fill_image
 from ros_3d_bb.conversions.perception_msgs import time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.diagnosis.message_observer import Observation
@@ -17,6 +18,7 @@ from ros_3d_bb.diagnosis.observations import Observations, Stream
 from ros_3d_bb.diagnosis.roles import ROLES
 from ros_3d_bb.diagnosis.tf_arrivals import TfArrivals
 from ros_3d_bb.diagnosis.tf_tree import clock_fault_of_tf
+from ros_3d_bb.nodes.common.graph_observer import GraphObserver
 from ros_3d_bb.nodes.doctor import bag_findings, graph_findings, machine_findings
 from ros_3d_bb.pipeline.transform_buffer import TransformBuffer
 from support.bags import changed_bag, scene_bag
@@ -178,3 +180,22 @@ def test_a_pipeline_in_another_namespace_is_reported(monkeypatch, nodes, named):
     with masterless():
         found = graph_findings(argparse.Namespace(camera='', target_frame='', seconds=0.0, patience=0.0))
     assert [each.fix for each in found if each.subject == 'namespace'] == ([named] if named else [])
+
+
+def observed_with(params, *messages):
+    """The Observations of a graph with these parameters of nodes, and with these (topic, message)."""
+    topics = {topic: message._type for topic, message in messages}
+    with masterless(params) as connections, mock.patch('time.sleep'), mock.patch.multiple(
+            'ros_3d_bb.nodes.common.graph_observer', published_topics=lambda: topics, publishers_of=mock.Mock()):
+        observer = GraphObserver()
+        for topic, message in messages:
+            connections.subscribers[topic].callback(message)
+        return observer.observations()
+
+
+def test_unit_and_frame_of_depth_may_be_those_of_parameters():
+    depth = fill_image(Image(header=header_at(NS, 'wrong')), np.full((48, 64), 2000, np.float32), '32FC1')
+    fault = observed_with({}, (DEPTH, depth)).depth.fault
+    assert 'millimetres in a 32FC1' in fault
+    seen = observed_with({'/bbox3d_node/depth_scale': 0.001, '/bbox3d_node/frame_id': 'camera'}, (DEPTH, depth))
+    assert seen.depth.fault == '' and seen.frame_id == 'camera'

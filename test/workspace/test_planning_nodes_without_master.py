@@ -244,3 +244,15 @@ def goals_sent(distance_m, seconds):
 def test_only_a_goal_that_is_not_reached_is_sent_again():
     assert goals_sent(6.0, 3 * RESENT_S + 1) == 4
     assert goals_sent(2.0, 3 * RESENT_S + 1) == 1
+
+
+@pytest.mark.parametrize('range_m, expected', [(5.0, 2.0), (0.0, 0.3), (np.nan, 0.3)])
+def test_a_scan_without_information_limits_the_speed_as_no_scan_does(range_m, expected):
+    with masterless({'use_scan': True}) as connections:
+        robot, connections.now = Robot(connections), time_from(START_NS)
+        robot.send_tf(START_NS)
+        connections.send('scan', LaserScan(
+            header=Header(stamp=connections.now, frame_id='base_link'), angle_min=-1.5, angle_increment=0.01,
+            range_min=0.1, range_max=10.0, ranges=[range_m] * 301))
+        robot.forwarded(START_NS)
+        assert robot.limit() == pytest.approx(expected) and ('scans rejected' in robot.counts) == (expected < 2)
