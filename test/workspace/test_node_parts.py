@@ -23,7 +23,7 @@ from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from support.masterless import masterless
 from support.ros import header_at
 
-IMAGE, UNUSABLE = Image(header=header_at(1000)), Image(header=header_at(1000))
+IMAGE = Image(header=header_at(1000))
 
 
 @pytest.mark.parametrize('name, parts, fault, place', [
@@ -88,17 +88,12 @@ def now_s():
 
 @pytest.fixture
 def rig(now_s):
-    """The worker, its service, the state and faults that it reports, and its detector, which takes a second."""
-    def detect(image):
-        now_s[0] += 1
-        if image is UNUSABLE:
-            raise ValueError('an unusable image')
-
+    """The worker, its service, and the state and faults that it reports. Its detector never completes."""
     diagnostics, path = EventCounter(), 'ros_3d_bb.nodes.common.detector_output.'
     diagnostics.show, diagnostics.check = mock.Mock(), mock.Mock()
-    with mock.patch(path + 'rospy') as rospy, mock.patch(path + 'NewestWorker') as thread:
-        worker = DetectorWorker(SimpleNamespace(enabled=True, publish_empty=True), diagnostics, detect, (), Part())
-    yield SimpleNamespace(offer=worker.offer, enable=rospy.Service.call_args[0][2], work=thread.call_args[0][0],
+    with mock.patch(path + 'rospy') as rospy, mock.patch(path + 'NewestWorker'):
+        worker = DetectorWorker(SimpleNamespace(enabled=True, publish_empty=True), diagnostics, None, (), Part())
+    yield SimpleNamespace(offer=worker.offer, enable=rospy.Service.call_args[0][2],
                           state=dict(call[0] for call in diagnostics.show.call_args_list)['detector'],
                           faults=lambda: list(diagnostics.check.call_args[0][0]()))
 
