@@ -1,3 +1,4 @@
+import doctest
 from unittest import mock
 
 import numpy as np
@@ -7,10 +8,12 @@ from hypothesis import given, strategies as st
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.object_classes import PERSON_CLASS
-from ros_3d_bb.estimation.box3d import (HIDDEN, NO_DEPTH, NO_LAYER, NO_RAY, REPEATED, UNKNOWN, ImageGeometry,
-                                        Rejected, truncated_edges)
-from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimate_foreground, estimator_named
+from ros_3d_bb.estimation import box3d_estimator, error_model
+from ros_3d_bb.estimation.body import truncated_edges
+from ros_3d_bb.estimation.box3d import HIDDEN, NO_DEPTH, NO_LAYER, NO_RAY, REPEATED, UNKNOWN, ImageGeometry, Rejected
+from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
 from ros_3d_bb.estimation.depth_samples import nearest_dominant_layer
+from ros_3d_bb.estimation.foreground import estimate_foreground
 from ros_3d_bb.sessions.session_reader import read_depth, read_session
 
 CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
@@ -185,6 +188,12 @@ def test_depths_beyond_any_camera_are_ignored():
     box = foreground(depth, (5, 5, 60, 45))
     assert box.center_m[2] == pytest.approx(2.0 + PERSON_CLASS.axis) and box.support == 1
     assert foreground(flat(1e-5, 1.0, np.float32), (5, 5, 60, 45)) == Rejected(NO_DEPTH)  # less than a millimetre
+
+
+@pytest.mark.parametrize('module', [box3d_estimator, error_model])
+def test_the_examples_give_what_they_state(module):
+    results = doctest.testmod(module)
+    assert results.attempted and not results.failed
 
 
 @pytest.mark.parametrize('name,stride,complaint', [('mean', 20, "estimator is 'mean'"), ('median', 0, 'stride is 0')])

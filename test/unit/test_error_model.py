@@ -141,7 +141,7 @@ def test_boxes_are_corrected_and_get_their_covariance():
 @pytest.mark.parametrize('model', [MODEL, None])
 @pytest.mark.parametrize('changed,gap_s,larger_m', [
     ({'support': 0.15}, 0, (0.2, 0, 0.125)), ({'truncated_edges': (False, True, False, False)}, 0, (0.06, 0, 0.03)),
-    ({}, 0.1, (0.08, 0, 0.08))])
+    ({}, 0.1, (0.095, 0, 0.095))])
 def test_covariance_grows_with_low_support_truncation_and_image_gap(model, changed, gap_s, larger_m):
     box = Box3D(np.array([0.5, 0.1, 2.0]), np.array([0.5, 1.7, 0.5]), (1, 2, 3, 4), 0.9, (False,) * 4)
     before, = corrected_boxes([box], model)

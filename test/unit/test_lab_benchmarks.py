@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation import box3d_estimator, depth_samples
+from ros_3d_bb.estimation import depth_samples, foreground
 from ros_3d_bb_lab.evaluation import __main__ as command
 from ros_3d_bb_lab.evaluation.ablation.benchmark import MECHANISMS, Mechanism, ablate, check
 from ros_3d_bb_lab.evaluation.navigation.navigation_scenes import DURATION_S, SCENES, scenario_of
@@ -138,7 +138,7 @@ def test_a_mechanism_is_off_wherever_it_is_imported_and_on_again_afterwards():
     mechanism = Mechanism('reach of a body', 'estimation.depth_samples', 'BODY_HALF_DEPTH_MM', 7)
 
     def reaches_mm():
-        return {'here': depth_samples.BODY_HALF_DEPTH_MM, 'there': box3d_estimator.BODY_HALF_DEPTH_MM}
+        return {'here': depth_samples.BODY_HALF_DEPTH_MM, 'there': foreground.BODY_HALF_DEPTH_MM}
     before_mm = reaches_mm()
     assert ablate([reaches_mm, reaches_mm], [mechanism]) == {
         '': {key: 2 * value for key, value in before_mm.items()}, 'reach of a body': {'here': 14, 'there': 14}}

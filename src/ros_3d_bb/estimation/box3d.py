@@ -4,17 +4,14 @@ Conventions: a rectangle (x1, y1, x2, y2) contains the pixels x1 <= u < x2, y1 <
 optical frame, metres. The level frame of a camera has the same origin, x horizontally to the right, y down and z
 horizontally ahead; `level_from_camera` (3, 3) rotates the optical frame to it.
 """
-from typing import Any, NamedTuple, Optional, Tuple
+from typing import Any, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.core.object_classes import MAX_COORDINATE_M, MAX_SIZE_M, PERSON
 
-# A box whose edge is this close to the image border, in pixels plus a share of its extent, counts as truncated. Chosen:
-# detectors regress the edge of a truncated person up to 8 pixels inside the image, farther for larger boxes. A person
-# who is not truncated there loses little, because only boxes of less than the usual size are completed.
-BORDER_PX, BORDER_SHARE = 4, 0.02
+Rect = Tuple[int, ...]  # x1, y1, x2, y2
 # Reasons why a rectangle gets no 3D box, each the event of its counter.
 NO_DEPTH, NO_RAY = 'boxes without depth', 'boxes without a viewing ray'  # of the rectangle, or its lens model
 NO_LAYER = 'boxes without a depth layer'  # what has depth is scattered, or is beside the object
@@ -26,13 +23,22 @@ LEVEL = np.eye(3)  # of a camera that is held level
 LEVEL_AXES = tuple(map(tuple, LEVEL.tolist()))
 
 
+class Edges(NamedTuple):
+    """Whether the image border truncates an object at each edge of its rectangle."""
+
+    left: bool
+    top: bool
+    right: bool
+    bottom: bool
+
+
 class ImageGeometry(NamedTuple):
     """Geometry of one image: its camera, the part of it with depth (see `DepthImage.measured_area`), and the axes of
     the level frame in the optical frame, the rows of `level_rotation`.
     """
 
     camera: Camera
-    area_px: Tuple[int, int, int, int]
+    area_px: Rect
     level_axes: Tuple[Tuple[float, float, float], ...] = LEVEL_AXES
 
 
@@ -40,18 +46,17 @@ class Box3D(NamedTuple):
     """An upright cylinder, with quality measures.
 
     `center_m` (3,) in the camera optical frame and `size_m` (width, height, width) are in metres; `rect_px` is the
-    source rectangle; `support` is the share 0..1 of the samples with depth that belong to its depth layer;
-    `truncated_edges` states whether the left, upper, right and lower edge of the rectangle touch the image border;
-    `covariance_m2` (3, 3) is that of the centre, None if unknown; `label` is the class name, and `score` is that of the
-    rectangle, 0..1, 0 if unknown; `largest_m` are the upper bounds of width and height; `appearance` are the colours of
-    the clothes (`appearance.appearance_of`), None if unknown.
+    source rectangle, and `truncated_edges` are its `Edges`; `support` is the share 0..1 of the samples with depth that
+    belong to its depth layer; `covariance_m2` (3, 3) is that of the centre, None if unknown; `label` is the class name,
+    and `score` is that of the rectangle, 0..1, 0 if unknown; `largest_m` are the upper bounds of width and height;
+    `appearance` are the colours of the clothes (`appearance.appearance_of`), None if unknown.
     """
 
     center_m: np.ndarray
     size_m: np.ndarray
-    rect_px: Tuple[int, int, int, int]
+    rect_px: Rect
     support: float
-    truncated_edges: Tuple[bool, bool, bool, bool]
+    truncated_edges: Tuple[bool, ...]
     covariance_m2: Optional[Any] = None
     label: str = PERSON
     score: float = 0.0
@@ -59,12 +64,12 @@ class Box3D(NamedTuple):
     appearance: Optional[Tuple[float, ...]] = None
 
     @property
-    def truncated(self):
+    def truncated(self) -> bool:
         """Whether the image border truncates the object."""
         return any(self.truncated_edges)
 
     @property
-    def is_plausible(self):
+    def is_plausible(self) -> bool:
         """Whether the centre is nearer than `MAX_COORDINATE_M`, and width and height are between 0 and `largest_m`."""
         x_m, y_m, z_m = self.center_m.tolist()
         (width_m, height_m), (widest_m, tallest_m) = self.size_m[:2].tolist(), self.largest_m
@@ -77,29 +82,18 @@ class Rejected(NamedTuple):
 
     reason: str
 
-    is_plausible = False
+    @property
+    def is_plausible(self) -> bool:
+        """As of a Box3D."""
+        return False
 
 
-def plausible(box):
+def plausible(box: Union[Box3D, Rejected]) -> Optional[Box3D]:
     """The Box3D if it is plausible; otherwise, and if the rectangle is Rejected, None."""
-    return box if box.is_plausible else None
+    return box if isinstance(box, Box3D) and box.is_plausible else None
 
 
-def truncated_edges(rect_px, area_px):
-    """Whether the left, upper, right and lower edge of a rectangle touch the border of the area with depth.
-
-    Returns
-    -------
-    (bool, bool, bool, bool)
-    """
-    x1, y1, x2, y2 = rect_px
-    left, top, right, bottom = area_px
-    across_px, down_px = BORDER_PX + BORDER_SHARE * (x2 - x1), BORDER_PX + BORDER_SHARE * (y2 - y1)
-    return (bool(x1 <= left + across_px), bool(y1 <= top + down_px), bool(x2 >= right - across_px),
-            bool(y2 >= bottom - down_px))
-
-
-def without_distortion(rects_px, camera):
+def without_distortion(rects_px: Sequence[Rect], camera: Camera) -> Sequence[Sequence[float]]:
     """Undistort rectangles (x1, y1, x2, y2) by the midpoints of their edges; nan if one has no undistorted position.
 
     Outside the image, where the distortion is unknown, the distortion at the image border is used.

@@ -7,24 +7,26 @@ A node knows only the measured position, so `ErrorModel.corrected` solves measur
 fitted by ros_3d_bb_lab.evaluation.error_model_fit; its file format is described in config/error_models/README.md.
 """
 import math
-from typing import NamedTuple, Optional
+from typing import Any, Callable, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 import yaml
 
 from ros_3d_bb.core import detector_model
 from ros_3d_bb.core.detector_model import DetectorModel
-from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.core.yaml_loader import load_yaml
+from ros_3d_bb.core.yaml_records import record_from, record_text
+from ros_3d_bb.estimation.box3d import Box3D
 
-STEEPEST_BIAS, SOLVER_STEPS = 0.5, 20  # m/m; chosen: each step at least halves the remaining error, 1 m to 1 µm
-NEAREST_SHARE = 0.2  # lower bound of a corrected range, relative to the measured range; chosen
+Point = Tuple[float, float, float]
+STEEPEST_BIAS, SOLVER_STEPS = 0.5, 20  # m/m; a fixed-point iteration: each step halves the error, 1 m to 1 µm
+NEAREST_SHARE = 0.2  # lower bound of a corrected range, relative to the measured range: it stays before the camera
 RECORDED = 'recorded'  # estimator of models that are fitted to the positions stored in a session
-UNCALIBRATED_SIGMA_M = 0.1  # of positions without an error model; chosen
+UNCALIBRATED_SIGMA_M = 0.1  # of positions without an error model; the RMSE of raw positions in ./run bench accuracy
 # Additional standard deviations along x and z: per unit of support below the first value, and of boxes at the image
-# border. Fitted once to simulated crowds, without a command to repeat it; test_difficult_views.py checks the coverage.
+# border. Fitted to simulated crowds; measured by test_covariances_hold_for_any_support of test_difficult_views.py.
 WELL_SUPPORTED, SUPPORT_SIGMAS_M, TRUNCATED_SIGMAS_M = 0.65, (0.4, 0.0, 0.25), (0.06, 0.0, 0.03)
-WALKING_MPS = (0.8, 0.0, 0.8)  # standard deviation of the velocity of people; chosen
+WALKING_MPS = (0.95, 0.0, 0.95)  # standard deviations: 1.34 m/s (Weidmann, 1993) in any direction, 1.34 / sqrt(2)
 
 
 class XBias(NamedTuple):
@@ -47,11 +49,11 @@ class Spread(NamedTuple):
     growth: float
     near_m2: float
 
-    def at(self, z_m):
+    def at(self, z_m: Any) -> np.ndarray:
         """Standard deviation at range z_m, metres, with the shape of z_m."""
         return np.sqrt(self.variance_at(np.asarray(z_m, float)))
 
-    def variance_at(self, z_m):
+    def variance_at(self, z_m: Any) -> Any:
         """Variance at range z_m (float or array), square metres."""
         return self.constant_m ** 2 + (self.growth * z_m ** 2) ** 2 + (self.near_m2 / z_m) ** 2
 
@@ -94,9 +96,18 @@ class ErrorModel(NamedTuple):
     `z_bias` holds the coefficients of a polynomial in z, highest power first; `y_sigma_m` is an assumption, as the
     ground truth does not include y; `growth_outside` is the standard deviation added to each axis per metre outside
     `measured_range`, m/m; `cross_validated` is None if not measured. `detector` is for the tracker.
+
+    >>> model = ErrorModel((0.02, 0.01), XBias(0.05, 0.0, 0.0), Spread(0.01, 0.002, 0.0), Spread(0.02, 0.0, 0.0), 0.1,
+    ...                    MeasuredRange(1.0, 6.0, 2.0, 1.0), 0.1, Provenance('', '', '', '', 0, 0), None)
+    >>> model.biased([1.0, 0.0, 4.0]).round(3).tolist()  # z: 0.02 * 4 + 0.01 too far
+    [1.05, 0.0, 4.09]
+    >>> model.corrected([1.05, 0.0, 4.09]).round(3).tolist()
+    [1.0, 0.0, 4.0]
+    >>> np.sqrt(model.variances_m2(1.0, 0.0, 4.0)).round(4).tolist()
+    [0.02, 0.1, 0.0335]
     """
 
-    z_bias: tuple
+    z_bias: Tuple[float, ...]
     x_bias: XBias
     z_sigma: Spread
     x_sigma: Spread
@@ -107,7 +118,7 @@ class ErrorModel(NamedTuple):
     cross_validated: Optional[Scores]
     detector: DetectorModel = DetectorModel()
 
-    def corrected(self, position_m):
+    def corrected(self, position_m: Any) -> np.ndarray:
         """Remove the bias from measured positions (..., 3). Inverse of `biased`.
 
         Outside the measured range, the bias is that at the limit of the range. y is scaled with z, along the ray.
@@ -115,7 +126,7 @@ class ErrorModel(NamedTuple):
         """
         return _each(self.corrected_point, position_m)
 
-    def corrected_point(self, measured_x_m, measured_y_m, measured_z_m):
+    def corrected_point(self, measured_x_m: float, measured_y_m: float, measured_z_m: float) -> Point:
         """As `corrected`, of one position."""
         if not measured_z_m > 0:
             raise ValueError('z is %g m; a position in front of the camera expected' % measured_z_m)
@@ -134,57 +145,57 @@ class ErrorModel(NamedTuple):
             x_m -= (scale - 1) * math.copysign(limit_m, x_m)
         return x_m, measured_y_m * z_m / measured_z_m, z_m
 
-    def biased(self, position_m):
+    def biased(self, position_m: Any) -> np.ndarray:
         """Noise-free measurements of true positions, (..., 3). Inverse of `corrected`."""
         return _each(self._biased_point, position_m)
 
-    def _biased_point(self, x_m, y_m, z_m):
+    def _biased_point(self, x_m: float, y_m: float, z_m: float) -> Point:
         measured_z_m, limit_m = z_m + self._z_bias_at(z_m), self.measured_range.x_max_m
         inside_m = min(max(x_m, -limit_m), limit_m)
         return (x_m + inside_m * self._x_slope_at(z_m) + self.x_bias.offset_m, y_m * measured_z_m / z_m, measured_z_m)
 
-    def check_estimator(self, name):
+    def check_estimator(self, name: str) -> None:
         """Raise ValueError if the model was fitted for another estimator. That of recorded positions is not known."""
         if self.provenance.estimator not in (name, '', RECORDED):
             raise ValueError('the error model is for the estimator %s, not %s' % (self.provenance.estimator, name))
 
-    def covariance(self, position_m):
+    def covariance(self, position_m: Any) -> np.ndarray:
         """Covariance (..., 3, 3) of corrected positions (..., 3) in the camera optical frame, square metres.
 
         The covariance is diagonal: the measurements show no correlation of x and z errors along the ray.
         """
         return _each(self.variances_m2, position_m)[..., np.newaxis] * np.eye(3)
 
-    def variances_m2(self, x_m, _y_m, z_m):
+    def variances_m2(self, x_m: float, _y_m: float, z_m: float) -> Point:
         """Variances of x, y and z of a corrected position: by its range, and by its distance to the measured range."""
         outside_m2 = (self.growth_outside * self.distance_outside(x_m, z_m)) ** 2
         return (self.x_sigma.variance_at(z_m) + outside_m2, self.y_sigma_m ** 2 + outside_m2,
                 self.z_sigma.variance_at(z_m) + outside_m2)
 
-    def distance_outside(self, x_m, z_m):
+    def distance_outside(self, x_m: float, z_m: float) -> float:
         """Distance of a corrected position to the measured range, metres; 0 inside."""
         limits = self.measured_range
         return max(0.0, limits.z_min_m - z_m, z_m - limits.z_max_m) + max(0.0, abs(x_m) - limits.x_max_m)
 
-    def _z_bias_at(self, z_m):
+    def _z_bias_at(self, z_m: float) -> float:
         inside_m = min(max(z_m, self.measured_range.z_min_m), self.measured_range.z_max_m)
         bias_m = 0.0
         for coefficient in self.z_bias:
             bias_m = bias_m * inside_m + coefficient
         return bias_m
 
-    def _x_slope_at(self, z_m):
+    def _x_slope_at(self, z_m: float) -> float:
         inside_m = min(max(z_m, self.measured_range.x_z_min_m), self.measured_range.z_max_m)
         return self.x_bias.slope + self.x_bias.per_angle_m / inside_m
 
 
-def _each(function, position_m):
+def _each(function: Callable[..., Point], position_m: Any) -> np.ndarray:
     """Results (..., 3) of a function of x, y and z at positions (..., 3)."""
     position_m = np.asarray(position_m, float)
     return np.reshape([function(*point_m) for point_m in position_m.reshape(-1, 3).tolist()], position_m.shape)
 
 
-def corrected_boxes(boxes, model=None, gap_s=0.0):
+def corrected_boxes(boxes: Sequence[Box3D], model: Optional[ErrorModel] = None, gap_s: float = 0.0) -> List[Box3D]:
     """Correct the bias of 3D boxes (`box3d.Box3D`) and set their covariance.
 
     Boxes with little support or at the image border are less certain than those to which an error model is fitted.
@@ -206,7 +217,7 @@ def corrected_boxes(boxes, model=None, gap_s=0.0):
     return corrected
 
 
-def checked(model):
+def checked(model: ErrorModel) -> ErrorModel:
     """Return the model after validation. Raises ValueError, with the bad value, if the model is unusable."""
     limits = model.measured_range
     if not (0 < limits.z_min_m < limits.z_max_m and limits.z_min_m <= limits.x_z_min_m <= limits.z_max_m
@@ -235,7 +246,7 @@ def checked(model):
     return model
 
 
-def read_error_model(path):
+def read_error_model(path: str) -> ErrorModel:
     """Read an ErrorModel from a YAML file; no code in the file is executed.
 
     Raises OSError if the file cannot be read, and ValueError if it is not YAML, or a key is unknown (the message names
@@ -243,12 +254,12 @@ def read_error_model(path):
     """
     with open(str(path), encoding='utf-8') as stream:
         try:
-            return checked(_filled(ErrorModel, load_yaml(stream), ''))
+            return checked(record_from(ErrorModel, load_yaml(stream)))
         except (ValueError, OverflowError, yaml.YAMLError) as error:
             raise ValueError('%s: not an error model: %s' % (path, error))
 
 
-def error_model_of_param(path):
+def error_model_of_param(path: str) -> Optional[ErrorModel]:
     """The ErrorModel of the parameter ~error_model of a node; None if it is empty. Raises ValueError."""
     try:
         return read_error_model(path) if path else None
@@ -256,49 +267,8 @@ def error_model_of_param(path):
         raise ValueError('the error model cannot be read: %s; an absolute path expected' % error)
 
 
-def write_error_model(path, model):
+def write_error_model(path: str, model: ErrorModel) -> None:
     """Write an error model in the format of `read_error_model`. Raises OSError."""
     with open(str(path), 'w', encoding='utf-8') as stream:
         stream.write('# Error model of measured positions; the keys are explained in config/error_models/README.md.\n')
-        for name, value in model._asdict().items():
-            if hasattr(value, '_fields'):
-                stream.write(name + ':\n' + ''.join('  ' + _line(*pair) for pair in value._asdict().items()))
-            else:
-                stream.write(_line(name, value))
-
-
-def _line(name, value):
-    if isinstance(value, tuple):
-        return '%s: [%s]\n' % (name, ', '.join(yaml.safe_dump(number).split()[0] for number in value))
-    return yaml.safe_dump({name: value}, default_flow_style=False, width=1000, allow_unicode=True)
-
-
-def _filled(kind, content, where):
-    """Convert YAML content to a value of `kind`, a NamedTuple or a plain type; `where` is its key."""
-    for optional in (Scores, float):
-        if kind == Optional[optional]:
-            return None if content is None else _filled(optional, content, where)
-    if hasattr(kind, '_fields'):
-        return _filled_fields(kind, content, where)
-    if kind is tuple and isinstance(content, list) and content:
-        return tuple(_filled(float, value, where) for value in content)
-    if kind is float and isinstance(content, int) and not isinstance(content, bool):
-        content = float(content)
-    if not isinstance(content, kind) or isinstance(content, bool) or (kind is float and not np.isfinite(content)):
-        raise ValueError('%s is %r; %s expected' % (where, content, {
-            tuple: 'a list of numbers', float: 'a number', int: 'an integer', str: 'text'}[kind]))
-    return content
-
-
-def _filled_fields(kind, content, where):
-    if not isinstance(content, dict):
-        raise ValueError('%s is %.50r; the keys %s expected' % (where or 'it', content, ', '.join(kind._fields)))
-    prefix = where + '.' if where else ''
-    for name in content:
-        if name not in kind._fields:
-            raise ValueError('unknown key %s%s; did you mean %s%s?'
-                             % (prefix, name, prefix, nearest_name(str(name), kind._fields)))
-    for name in kind._fields:
-        if name not in content and name not in kind._field_defaults:
-            raise ValueError('the key %s%s is missing' % (prefix, name))
-    return kind(**{name: _filled(kind.__annotations__[name], value, prefix + name) for name, value in content.items()})
+        stream.write(record_text(model))

@@ -1,11 +1,14 @@
 """The estimator of the thesis (3.4): medians of the depth samples on a grid. See `box3d` for the conventions."""
+from typing import Any, Tuple, Union
+
 import numpy as np
 
-from ros_3d_bb.estimation.box3d import NO_DEPTH, NO_RAY, Box3D, Rejected, truncated_edges, without_distortion
+from ros_3d_bb.estimation.body import truncated_edges
+from ros_3d_bb.estimation.box3d import NO_DEPTH, NO_RAY, Box3D, ImageGeometry, Rect, Rejected, without_distortion
 from ros_3d_bb.estimation.depth_samples import BODY_HALF_DEPTH_MM
 
 
-def centred_grid(rect_px, shape, stride_px):
+def centred_grid(rect_px: Rect, shape: Tuple[int, ...], stride_px: int) -> Tuple[slice, slice]:
     """Slices of rows and columns: every `stride_px` pixels, centred in a rectangle, and clipped to an image with a
     shape (h, w). They are empty in an empty or reversed rectangle.
     """
@@ -13,7 +16,7 @@ def centred_grid(rect_px, shape, stride_px):
     return _ticks(y1, y2, height, stride_px), _ticks(x1, x2, width, stride_px)
 
 
-def _ticks(low, high, limit, stride):
+def _ticks(low: int, high: int, limit: int, stride: int) -> slice:
     """Slice of positions `stride` apart, centred in low..high and clipped to 0..limit; exact for ints of any size."""
     count = -(-(high - low) // stride)
     first = low + (high - low - (count - 1) * stride - 1) // 2
@@ -21,7 +24,7 @@ def _ticks(low, high, limit, stride):
     return slice(first, max(first, min(high, limit)), stride) if first < limit else slice(0, 0)
 
 
-def estimate_median(samples, rect_px, geometry):
+def estimate_median(samples: Any, rect_px: Rect, geometry: ImageGeometry) -> Union[Box3D, Rejected]:
     """Estimate a box as in the thesis (3.4.2): per-axis median of the sampled points, size from the box at that depth.
 
     Returns a Box3D, or Rejected without a valid depth or if the rectangle cannot be undistorted. The tilt of the camera

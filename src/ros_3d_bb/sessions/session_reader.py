@@ -18,7 +18,8 @@ from ros_3d_bb.camera.distortion import PLUMB_BOB
 from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb.estimation.box3d import plausible, truncated_edges
+from ros_3d_bb.estimation.body import truncated_edges
+from ros_3d_bb.estimation.box3d import plausible
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, level_rotation
 
 FILE_NAME = 'frames.json'

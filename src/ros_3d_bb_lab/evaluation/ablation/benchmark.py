@@ -19,6 +19,7 @@ from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.sessions.session_reader import read_depth, read_session
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb_lab.evaluation import accuracy, scene_benchmark
+from ros_3d_bb_lab.evaluation.ablation.views import scores_of_views, simulated_views
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, data_folder, default_weights, scenario_path
 from ros_3d_bb_lab.evaluation.detector_benchmark import open_networks
 from ros_3d_bb_lab.evaluation.detectors import detector_of
@@ -59,18 +60,20 @@ MECHANISMS = tuple(Mechanism(*row) for row in (
     ('order of objects', 'estimation.overlaps', 'Overlaps._is_nearer', lambda *_: False),
     ('masks of nearer objects', 'estimation.overlaps', 'Overlaps.mask_behind', _nothing),
     ('outline of the rectangle', 'estimation.depth_samples', 'LEAST_INSIDE', 1.0),
-    ('weights of rows', 'estimation.depth_samples', 'LOWER_WEIGHT', 1.0),
+    ('weights of samples', 'estimation.depth_samples', '_weights',
+     lambda shape: np.full(shape[0] * shape[1], 1 / (shape[0] * shape[1]))),
+    ('rows of the image', 'estimation.overlaps', 'CLEARLY_LOWER', 2.0),
+    ('layers beside each other', 'estimation.overlaps', 'CLEARLY_FULLER', 2.0),
+    ('second boxes', 'estimation.overlaps', 'CONTAINED', 2.0),
     ('nearest dominant layer', 'estimation.depth_samples', 'FIRST_LAYER_SHARE', 1.0),
     ('background that fills the sides', 'estimation.depth_samples', 'RectSamples.fill_sides', lambda *_: False),
     ('unknown depth in the middle', 'estimation.depth_samples', 'RectSamples.surround_unknown', lambda *_: False),
-    ('least support', 'estimation.box3d_estimator', 'LEAST_SUPPORT', 0.0),
-    ('least number of depths', 'estimation.box3d_estimator', 'LEAST_MEASURED', 0.0),
-    ('level frame', 'estimation.box3d_estimator', 'MAX_TILT_RAD', 0.0),
-    ('wider rectangles of near people', 'estimation.box3d_estimator', '_widened',
-     lambda samples, *_arguments: samples.rect_px),
-    ('completion at the image border', 'estimation.box3d_estimator', 'complete_truncated_extent',
-     lambda low, high, *_arguments: (low, high)),
-    ('border in proportion to the box', 'estimation.box3d', 'BORDER_SHARE', 0.0),
+    ('least support', 'estimation.foreground', 'LEAST_SUPPORT', 0.0),
+    ('least share of the samples', 'estimation.foreground', 'LEAST_SHARE', 0.0),
+    ('level frame', 'estimation.box3d_estimator', 'STEEP', 2.0),
+    ('wider rectangles of near people', 'estimation.body', '_widened', lambda seen, *_arguments: seen.rect_px),
+    ('completion at the image border', 'estimation.body', 'Extent.completed', lambda extent, *_arguments: extent),
+    ('border in proportion to the box', 'estimation.body', 'BORDER_SHARE', 0.0),
     ('uncertainty of little support', 'estimation.error_model', 'SUPPORT_SIGMAS_M', (0.0, 0.0, 0.0)),
     ('uncertainty at the image border', 'estimation.error_model', 'TRUNCATED_SIGMAS_M', (0.0, 0.0, 0.0)),
     ('manoeuvres', 'tracking.tracker', 'match_manoeuvres', lambda *_: []),
@@ -141,6 +144,11 @@ def thesis_frames(_arguments):
     yield scores
 
 
+def views(_arguments):
+    """Scores of the 3D boxes in simulated views."""
+    yield functools.partial(scores_of_views, list(simulated_views()))
+
+
 def pedestrians(_arguments):
     """Scores of tracks of the recorded pedestrians, from a standing and a driving robot."""
     runs = [simulate(sequence, motion, (0, 0), seconds=PEDESTRIANS_S)
@@ -196,9 +204,9 @@ def videos(arguments):
 
 
 # What is scored in each benchmark: a function yields functions that return the scores of a part of its data.
-BENCHMARKS = {'thesis': (thesis_frames, (ESTIMATION,)), 'pedestrians': (pedestrians, (TRACKING,)),
-              'kitti': (kitti, (TRACKING,)), 'scenes': (scenes, (ESTIMATION, TRACKING)),
-              'video': (videos, (ESTIMATION, TRACKING))}
+BENCHMARKS = {'thesis': (thesis_frames, (ESTIMATION,)), 'views': (views, (ESTIMATION,)),
+              'pedestrians': (pedestrians, (TRACKING,)), 'kitti': (kitti, (TRACKING,)),
+              'scenes': (scenes, (ESTIMATION, TRACKING)), 'video': (videos, (ESTIMATION, TRACKING))}
 
 
 def ablate(parts, mechanisms):
