@@ -65,7 +65,8 @@ def test_a_box_has_the_distance_of_its_class(label, behind_m):
     assert box.label == label and box.center_m[2] == pytest.approx(3 + behind_m, abs=0.015)
 
 
-@pytest.mark.parametrize('label, width_m, height_m', [('person', 0.356, 1.7), ('chair', 0.38, 0.9), ('drone', 0.2, 0.4)])
+@pytest.mark.parametrize('label, width_m, height_m', [
+    ('person', 0.356, 1.7), ('chair', 0.38, 0.9), ('drone', 0.2, 0.4)])
 def test_truncated_boxes_are_completed_to_the_height_and_towards_the_width_of_their_class(label, width_m, height_m):
     depth_mm = np.full((480, 640), 5000, np.uint16)
     depth_mm[400:, :41] = 3000
