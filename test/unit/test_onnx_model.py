@@ -7,7 +7,7 @@ import pytest
 from ros_3d_bb.core.object_classes import COCO
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetector
-from ros_3d_bb.detection.onnx.heads import P3, P6
+from ros_3d_bb.detection.onnx.heads import P6
 from ros_3d_bb.detection.onnx.onnx_model import OnnxModel
 from ros_3d_bb.detection.weights import WeightsError
 from ros_3d_bb.detection.yolov5.backends import open_detector
@@ -145,9 +145,9 @@ def test_a_class_that_the_network_does_not_have_is_named(tmp_path, names, reason
 COLOR = (3, 200, 5)
 
 
-@pytest.mark.parametrize('head', ['yolov8', 'yolox', 'nanodet', 'nanodet-plus', 'picodet'])
+@pytest.mark.parametrize('head', ['yolov8', 'yolox'])
 def test_outputs_without_a_batch_axis(tmp_path, head):
-    outputs = outputs_of(head, BOXES, SCORES, HW, P6 if head in ('nanodet-plus', 'picodet') else P3)
+    outputs = outputs_of(head, BOXES, SCORES, HW)
     network = OnnxModel(write_constant_network(tmp_path / 'a.onnx', [output[0] for output in outputs]), 1)
     assert network.description.endswith('head: ' + head)
     found = network.candidates(np.zeros(HW + (3,), np.uint8), 0.25)
@@ -166,39 +166,18 @@ def test_every_input_format(tmp_path, shape, channels_last, element, scale, atol
     assert found.classes.tolist() == [int(COLOR[2] * scale)]
 
 
-@pytest.mark.parametrize('text, expected', [
-    ('color: bgr', (5, 200, 3)), ('std: [1, 1, 1]', (3 * 255, 200 * 255, 5 * 255)),
-    ('{color: bgr, mean: [4, 0, 1], std: [255, 255, 127.5]}', (1, 200, 4)), ('', COLOR)])
-def test_the_yaml_file_gives_color_mean_and_scale(tmp_path, text, expected):
-    (tmp_path / 'a.yaml').write_text(text)
-    network = OnnxModel(write_mean_network(tmp_path / 'a.onnx'), 1)
-    found = network.candidates(np.full(HW + (3,), COLOR, np.uint8), 0.25)
-    np.testing.assert_allclose(found.boxes[0, :3] * 255, expected, atol=1e-2)
+def test_the_yaml_file_gives_the_names_of_classes(tmp_path):
+    path = write_constant_network(tmp_path / 'a.onnx', outputs_of('yolox', BOXES, SCORES, HW))
+    (tmp_path / 'a.yaml').write_text('names: [person, dog, chair]')
+    assert OnnxModel(path, 1).names == ['person', 'dog', 'chair']
 
 
-def test_the_yaml_file_gives_head_names_and_resizing(tmp_path):
-    path = write_constant_network(tmp_path / 'a.onnx', outputs_of('yolox', BOXES, SCORES, HW, (16, 32)))
-    with pytest.raises(WeightsError, match='no known head'):
-        OnnxModel(path, 1)
-    (tmp_path / 'a.yaml').write_text('{head: yolox, strides: [16, 32], names: [person, dog, chair], resize: stretch, '
-                                     'padding: 9}')
-    network = OnnxModel(path, 1)
-    assert network.names == ['person', 'dog', 'chair'] and network.resize == ('stretch', 9)
-    assert network.description.endswith('head: yolox')
-    found = NetworkDetector(network, ALL).detect(np.zeros((192, 128, 3), np.uint8))
-    np.testing.assert_allclose(found.boxes, BOXES * (1, 2, 1, 2), atol=1e-3)
-
-
-@pytest.mark.parametrize('text, reason', [
-    ('colour: bgr', 'unknown.*colour.*did you mean.*color.*std'), ('color: grey', "'grey'.*rgb, bgr"),
-    ('std: [1, 0, 1]', 'greater than 0'), ('names: [a, no]', 'quotes'), ('padding: ' + '9' * 400, 'padding is 1.79'),
-    ('std: [0.225, 0.224, 0.229]', 'units.*57.375'), ('mean: [0.4, 0.45, 0]', 'units.*102.0'),
-    ('strides: [8, 16]', 'strides.*240 cells'), ('- a', 'keys and values'), ('a: [', 'parsing'),
-    ('a: &x [1]\nb: *x', 'alias'), ('#' * 1000001, 'larger')])
-def test_yaml_files_that_cannot_be_used_are_rejected(tmp_path, text, reason):
+@pytest.mark.parametrize('text', ['names: [a, no]', 'names: [a]\ncolor: bgr', '- a', 'a: [', 'names: &x [1]\nb: *x',
+                                  '#' * 1000001, 'names: []', 'names: [a, b]'])
+def test_yaml_files_that_cannot_be_used_are_rejected(tmp_path, text):
     path = write_constant_network(tmp_path / 'model.onnx', outputs_of('yolov8', BOXES, SCORES, HW))
     (tmp_path / 'model.yaml').write_text(text)
-    with pytest.raises(WeightsError, match='(?s)model.*(%s)' % reason):
+    with pytest.raises(WeightsError, match='(?s)model.*names'):
         OnnxModel(path, 1)
 
 

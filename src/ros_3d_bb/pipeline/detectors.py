@@ -33,7 +33,7 @@ class Row(NamedTuple):
 
 
 DETECTORS = {
-    'yolov5': Row(NetworkPeople, (DetectionParams, RuntimeParams), suffixes=('.pt', '.torchscript', '.onnx'),
+    'yolov5': Row(NetworkPeople, (DetectionParams, RuntimeParams), suffixes=('.pt', '.onnx'),
                   for_bags={'device': 'cpu', 'threads': 1}),
     'depth': Row(DepthDetector, (DepthPeopleParams,), uses_depth=True)}
 
