@@ -25,7 +25,7 @@ from ros_3d_bb_lab.evaluation.detectors import detector_of
 from ros_3d_bb_lab.evaluation.text_table import lines_of
 from ros_3d_bb_lab.evaluation.tracking.benchmark import outputs_of
 from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
-from ros_3d_bb_lab.evaluation.tracking.recorded_detections import read_recordings, with_sources
+from ros_3d_bb_lab.evaluation.tracking.recorded_detections import read_recordings
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING, STANDING
 from ros_3d_bb_lab.evaluation.tracking.run_generator import simulate
 from ros_3d_bb_lab.evaluation.tracking.trajectories import read_sequences
@@ -150,7 +150,7 @@ def pedestrians(_arguments):
 
 def kitti(_arguments):
     """Scores of tracks of the recorded detections."""
-    yield functools.partial(_track_scores, list(map(with_sources, read_recordings(data_folder('kitti'), 1, True))))
+    yield functools.partial(_track_scores, list(read_recordings(data_folder('kitti'))))
 
 
 def _track_scores(runs):

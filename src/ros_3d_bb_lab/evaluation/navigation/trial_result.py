@@ -12,7 +12,6 @@ OCCUPIED = 100
 STANDING_MPS, DRIVING_MPS = 0.05, 0.15
 CONTACT_SPEEDS = 3  # odometry of 60 ms
 SHINS_M = 0.15  # radius of a person at the height of a planar laser, both legs
-POINT_STEP_PX, FARTHEST_POINT_M = 8, 6.0
 
 
 class Pace(object):
@@ -65,14 +64,6 @@ class VisiblePeople(object):
         """Those of the tracks (with `id` and `status`) that are visible in the newest image of any camera."""
         self._visible.append({track.id for track in tracks if track.status == VISIBLE})
         return [track for track in tracks if any(track.id in visible for visible in self._visible)]
-
-
-def points_of(depth, camera):
-    """Points (n, 3) of every `POINT_STEP_PX`-th pixel of a DepthImage up to `FARTHEST_POINT_M`, in the camera frame."""
-    v, u = (part.ravel() for part in np.mgrid[:depth.shape[0]:POINT_STEP_PX, :depth.shape[1]:POINT_STEP_PX])
-    depth_m, is_valid = depth.at(u, v)
-    is_valid &= depth_m <= FARTHEST_POINT_M
-    return camera.deproject(np.stack([u, v], axis=-1)[is_valid].astype(float), depth_m[is_valid])
 
 
 def distance_m(one, other):

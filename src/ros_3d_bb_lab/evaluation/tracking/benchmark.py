@@ -11,13 +11,12 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb_lab.evaluation.baselines.norfair_baseline import LIDAR, LIDAR_SCORE, Norfair
-from ros_3d_bb_lab.evaluation.baselines.oracle_association import outputs_with_perfect_association
 from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker, as_it_arrived
 from ros_3d_bb_lab.evaluation.defaults import data_folder, in_range
 from ros_3d_bb_lab.evaluation.text_table import line_of, table_of, transposed
 from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
 from ros_3d_bb_lab.evaluation.tracking.prediction_benchmark import predictions
-from ros_3d_bb_lab.evaluation.tracking.recorded_detections import read_recordings, with_error_model, with_sources
+from ros_3d_bb_lab.evaluation.tracking.recorded_detections import read_recordings, with_error_model
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING, STANDING
 from ros_3d_bb_lab.evaluation.tracking.run_generator import SECONDS, simulate
 from ros_3d_bb_lab.evaluation.tracking.trajectories import COLUMNS, made_sequences, read_sequences
@@ -57,7 +56,6 @@ def _norfair_outputs(make_tracker, run):
 
 CONTESTANTS_ON_DETECTIONS = (Contestant('ours', Tracker, outputs_of),
                              Contestant('library', Norfair, _norfair_outputs))
-BOUND = Contestant('perfect_association', Tracker, outputs_with_perfect_association)
 
 
 def compare(runs, contestants):
@@ -110,24 +108,20 @@ def _run_on_detections(arguments):
 
 
 def _run_at_rates(runs, arguments):
-    """Compare our tracker with perfect association by image rate, on the pedestrians, and on the recorded detections if
-    there are any. The difference is the loss by data association; what perfect association lacks, boxes do not show, or
-    the birth of tracks delays.
-    """
+    """Score our tracker by image rate, on the pedestrians, and on the recorded detections if there are any."""
     parts = [('pedestrians', runs, PEDESTRIANS_EVERY)]
     if arguments.detections:
         recordings = read_recordings(arguments.detections, 1, not arguments.no_odometry)
-        parts.append(('recorded_detections', [with_sources(run) for run in recordings], RECORDINGS_EVERY))
+        parts.append(('recorded_detections', list(recordings), RECORDINGS_EVERY))
     result = {part: {} for part, _runs, _rates in parts}
     for part, runs, rates in parts:
         for every in rates:
             thinned = [run._replace(images=run.images[::every]) for run in runs]
             gaps_ns = np.concatenate([np.diff([image.stamp_ns for image in run.images]) for run in thinned])
             rate_hz = '%.1f' % (NS / np.median(gaps_ns))
-            result[part][rate_hz] = {name: {key: scores[key] for key in RATE_SCORES}
-                                     for name, scores in compare(thinned, (CONTESTANTS[0], BOUND)).items()}
-            for name, scores in result[part][rate_hz].items():
-                print(line_of(part, rate_hz + ' Hz', name, **scores), flush=True)
+            scores = compare(thinned, CONTESTANTS[:1])['ours']
+            result[part][rate_hz] = {key: scores[key] for key in RATE_SCORES}
+            print(line_of(part, rate_hz + ' Hz', **result[part][rate_hz]), flush=True)
     return result
 
 
@@ -137,8 +131,8 @@ def add_options(parser):
                         'it exists, otherwise generated trajectories)' % ','.join(COLUMNS))
     parser.add_argument('--detections', metavar='DIR', help='track recorded 3D detections instead: a folder of '
                         'recordings, see doc/benchmark_methods.md')
-    parser.add_argument('--rates', action='store_true', help='compare our tracker with perfect data association by '
-                        'image rate instead: the pedestrians, and the recordings of --detections if it is given')
+    parser.add_argument('--rates', action='store_true', help='score our tracker by image rate instead: on the '
+                        'pedestrians, and on the recordings of --detections if it is given')
     parser.add_argument('--every', type=in_range(int, 1), default=1, metavar='N',
                         help='of --detections: use each N-th image')
     parser.add_argument('--no-odometry', action='store_true',

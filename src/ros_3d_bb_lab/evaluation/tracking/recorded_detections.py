@@ -14,10 +14,8 @@ import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera, transform_from, transform_points
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.association import assign, plane_distances
+from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb.tracking.types import OUT_OF_VIEW, VISIBLE, CameraView, Detection
-from ros_3d_bb_lab.evaluation.tracking.detection_generator import FALSE
-from ros_3d_bb_lab.evaluation.tracking.metrics import MATCHED_M
 from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S, UNSCORED_M, Image, RunTruth
 from ros_3d_bb_lab.evaluation.tracking.trajectories import pedestrian_of, read_rows
 
@@ -77,22 +75,6 @@ def _corrected(detections, fixed_from_camera, model):
     return corrected
 
 
-def with_sources(run):
-    """The RecordedRun with the person that each box shows, for perfect association: people and boxes within `MATCHED_M`
-    are matched one to one, as many as possible, with the least sum of distances. The other boxes are false."""
-    return run._replace(images=tuple(image._replace(sources=_sources(image)) for image in run.images))
-
-
-def _sources(image):
-    sources = np.full(len(image.detections), FALSE)
-    if len(sources) and len(image.truth.ids):
-        places_m = np.array([detection.position_m for detection in image.detections])
-        distances_m = plane_distances(places_m, image.truth.position_m)
-        rows, columns = assign(np.where(distances_m <= MATCHED_M, distances_m, np.inf))
-        sources[rows] = image.truth.ids[columns]
-    return sources.tolist()
-
-
 def read_recordings(folder, every=1, with_odometry=True):
     """Yield the runs of the recordings in the subfolders of a folder, or of a folder that is itself a recording.
 
@@ -130,7 +112,7 @@ def _read_recording(folder, every, with_odometry):
     for stamp in stamps[::every]:
         view = CameraView(seen_from[stamp], camera, 'camera')
         boxes = [_detection(box, view.fixed_from_camera, are_logits) for box in found.get(stamp, [])]
-        images.append(Image(stamp, boxes, view, people.at(stamp, view), [], stamp, view))
+        images.append(Image(stamp, boxes, view, people.at(stamp, view), stamp, view))
         unscored[stamp] = _unscored(ignored.get(stamp, []), used_from[stamp])
     return RecordedRun(os.path.basename(os.path.normpath(folder)), tuple(images), unscored)
 
