@@ -48,15 +48,3 @@ def test_the_output_folder_and_the_estimator_of_the_analysis_can_be_chosen(tmp_p
     with open(os.path.join(out, 'summary.json')) as stream:
         assert len(json.load(stream)['z']['clusters']) == 6
     assert read_error_model(os.path.join(out, 'error_model.yaml')).provenance.estimator == 'recorded'
-
-
-@pytest.mark.parametrize('break_it,problem', [
-    (lambda entry: entry['detections'][0].update(box=[10, 4, 26, 49]), 'box (10, 4, 26, 49) is not inside the image'),
-    (lambda entry: entry.update(truth_mm={'x': -466.5, 'z': 3600}), 'is implausible'),
-    (lambda entry: entry.update(detections=[]), 'nobody was found')])
-def test_problems_are_listed(annotated_folder, capsys, break_it, problem):
-    change_json(annotated_folder, lambda content: break_it(content['frames'][1]))
-    assert main(['--validate', annotated_folder]) == 1
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith('m1: ') and problem in '\n'.join(lines)
-    assert lines[-1].endswith((' 1 problem', ' 2 problems'))

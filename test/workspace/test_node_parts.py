@@ -39,7 +39,7 @@ def test_a_node_that_cannot_start_names_the_launch_argument(name, parts, fault, 
     stored = {'/bbox3d_node': {'stride': 0}, '/tracker_node': {}, '/detector_node': {'weights': ''}}
     with mock.patch.multiple(rospy, init_node=mock.DEFAULT, logfatal=mock.DEFAULT, get_name=lambda: '/' + name,
                              resolve_name=lambda each: '/' + each, get_param=lambda each, _none: stored[each]) \
-            as mocked, mock.patch.object(startup, 'Registration'), pytest.raises(SystemExit):
+            as mocked, mock.patch.object(startup, 'cache_logging_parameter'), pytest.raises(SystemExit):
         startup.run_node(name, node, parts=parts)
     text, *values = mocked['logfatal'].call_args[0]
     printed = text % tuple(values)
@@ -184,7 +184,6 @@ def parameters(monkeypatch):
     monkeypatch.setattr('rospy.get_name', lambda: '/tracker_node')
     monkeypatch.setattr('rospy.get_param', lambda name, default: parameters.get(name, default))
     monkeypatch.setattr('rospy.set_param', set_param)
-    monkeypatch.setattr('ros_3d_bb.nodes.tracker_node.on_new_master', lambda _function: None)
     monkeypatch.setattr('ros_3d_bb.nodes.tracker_node.NewestWorker', immediately)
     return parameters
 

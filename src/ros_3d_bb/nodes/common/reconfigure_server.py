@@ -7,7 +7,6 @@ from dynamic_reconfigure.msg import Config, ConfigDescription, Group, ParamDescr
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
 
 from ros_3d_bb.core.params import params_from, table_of
-from ros_3d_bb.nodes.common.master import on_new_master
 from ros_3d_bb.nodes.common.startup import stored_params
 
 TYPES = {bool: 'bool', int: 'int', float: 'double', str: 'str', tuple: 'str'}  # the protocol has no lists
@@ -50,7 +49,6 @@ class ReconfigureServer(object):
         descriptions_pub.publish(description)
         self._updates_pub.publish(self._message())
         rospy.Service(namespace + 'set_parameters', Reconfigure, self._on_request)
-        on_new_master(lambda: self._store_changes({}))
 
     def _on_request(self, request):
         with self._lock:

@@ -7,7 +7,7 @@ from typing import Any, Callable, NamedTuple, Optional
 import rospy
 
 from ros_3d_bb.core.params import params_from, with_places
-from ros_3d_bb.nodes.common.master import Registration
+from ros_3d_bb.nodes.common.master import cache_logging_parameter
 
 # Launch arguments for the parameter files of nodes.
 PARAMS_FILES = {'%s_node' % name: '%s_params' % name for name in (
@@ -79,7 +79,7 @@ def run_node(name, node_class, run=lambda _node: rospy.spin(), parts=()):
     """
     reuse_freed_memory()
     rospy.init_node(name)
-    Registration(parts)
+    cache_logging_parameter()
     try:
         node = node_class()
     except ValueError as error:
