@@ -58,11 +58,10 @@ class Edits(object):
             if self._window.pane.truth.has_keyboard():
                 self._window.pane.truth.begin()
 
-    def draw_box(self, box_px, is_new):
-        """Add a box drawn by hand, or replace the selected one, and select it. The truth has the keyboard then."""
+    def draw_box(self, box_px):
+        """Add a box drawn by hand, and select it. The truth has the keyboard then."""
         window = self._window
-        person = None if is_new else window.measurement.person
-        if self._edit(lambda document: document.draw_box(window.current, box_px, person)):
+        if self._edit(lambda document: document.draw_box(window.current, box_px)):
             position_m = window.document.estimates.of(window.current)[window.measurement.person]
             window.statusBar().showMessage('The box is selected' if position_m is not None else
                                            'The box has not enough depth for an estimate')
@@ -96,13 +95,9 @@ class Edits(object):
         """Set a truth (x, y, z) of measurements. The user is asked about those where it is implausible."""
         document = self._window.document
         problems = {index: found for index in indices for found in [truth_problems(document, index, truth_m)] if found}
-        if problems:
-            answer = dialogs.ask_implausible(self._window, problems, len(indices))
-            if answer is None:
-                self._window.pane.truth.begin()
-                return
-            if isinstance(answer, tuple):
-                truth_m = answer
+        if problems and not dialogs.ask_implausible(self._window, problems, len(indices)):
+            self._window.pane.truth.begin()
+            return
         self._window.pane.truth.forget_typed()
         x_m, y_m, z_m = truth_m
         self._enter(lambda document: document.set_truths(indices, x_m, z_m, y_m),

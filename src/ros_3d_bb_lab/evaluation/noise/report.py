@@ -118,9 +118,9 @@ def _left_out(analysis, _drawn):
     return pieces + [
         paragraph('Outliers have a true position whose error is far from what the other measurements make likely: '
                   'probably a slip in the entry, or the box of another person. They are left out of all results.'),
-        table('outliers', ('measurement', 'true', 'estimate', 'would be plausible'), [
-            (outlier.name, position_text(outlier.truth_m), position_text(outlier.measured_m),
-             '–' if outlier.intended_m is None else position_text(outlier.intended_m)) for outlier in inputs.outliers])]
+        table('outliers', ('measurement', 'true', 'estimate'), [
+            (outlier.name, position_text(outlier.truth_m), position_text(outlier.measured_m))
+            for outlier in inputs.outliers])]
 
 
 def _z(analysis, drawn):
