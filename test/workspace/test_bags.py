@@ -9,9 +9,10 @@ import rosbag
 from std_msgs.msg import String
 
 from conftest import DATA
-from ros_3d_bb.bags.bag_writer import START_NS, session_images, session_to_bag, write_bag
+from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.images import DepthImage
+from ros_3d_bb.conversions.camera_msgs import START_NS
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, camera_from_msg, time_from, tracks_from_msg
 from ros_3d_bb.core.time_sync import NS
@@ -20,7 +21,7 @@ from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_sessi
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images, scenario_to_bag
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
-from support.bags import messages_in
+from support.bags import messages_in, session_images
 
 
 @pytest.fixture(scope='module')
@@ -69,11 +70,6 @@ def run_tool(monkeypatch, capsys, tmp_path):
             status = error.code
         return status, ''.join(capsys.readouterr())
     return run
-
-
-def test_a_session_is_written_without_boxes_by_default(folder, run_tool):
-    assert run_tool(session_to_bag, folder, 'out.bag', '--rate', '15') == (0, 'out.bag: 4 images\n')
-    assert '/yolo_bounding_box' not in messages_in('out.bag')
 
 
 SCENE = {'duration': 0.5, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}],

@@ -18,7 +18,7 @@ from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.nodes.bbox3d_node import SampleImages
 from ros_3d_bb.nodes.common import master, startup, subscribers
 from ros_3d_bb.nodes.common.detector_output import DetectorWorker
-from ros_3d_bb.nodes.common.diagnostics import Diagnostics, unsubscribed_results
+from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.startup import Part
 from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
 from ros_3d_bb.nodes.tracker_node import RESERVED_IDS, TrackIdReservation
@@ -146,17 +146,6 @@ def test_what_is_published_once_is_no_silent_input(subscribe, kind, before, coun
         assert not list(monitor.faults())
         inputs[0].count, subscriber().get_num_connections.return_value = count, 0
         assert list(monitor.faults()) == [('silence on once', 'silent')]
-
-
-def test_topics_of_dynamic_reconfigure_are_no_results():
-    """They have subscribers while rqt_reconfigure is open."""
-    tracks, parameters = mock.Mock(), mock.Mock()
-    tracks.has_connections.return_value, parameters.has_connections.return_value = False, True
-    with mock.patch('ros_3d_bb.nodes.common.diagnostics.get_topic_manager') as manager:
-        manager.return_value.pubs = {'/ros_3d_bb/tracks': tracks, rospy.get_name() + '/parameter_updates': parameters}
-        assert unsubscribed_results() == ['/ros_3d_bb/tracks']
-        tracks.has_connections.return_value = True
-        assert unsubscribed_results() == []
 
 
 NAME = '/tracker_node_numbers'

@@ -29,8 +29,7 @@ class Part(NamedTuple):
     Parameters, services and diagnostics have the names of a node of its own, whose private namespace is `namespace`.
     `transforms` and `inputs`, an RgbdInputs, are shared; None: the node has its own. `next_stage` is called with each
     result after it is published, and what the next stage needs with it. `subscribes` states whether the node subscribes
-    to the results of the stage before, and `monitors` whether its diagnostics report on the inputs and subscribers of
-    the process.
+    to the results of the stage before, and `monitors` whether its diagnostics report on the inputs of the process.
     """
 
     namespace: str = '~'

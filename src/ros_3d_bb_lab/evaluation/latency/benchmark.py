@@ -114,6 +114,6 @@ def add_options(parser):
                         help='images per second (default: 30)')
     parser.add_argument('--weights', nargs='+', default=list(filter(None, [default_weights()])), metavar='FILE',
                         help='model files: YOLOv5 checkpoints, ONNX files (default: yolov5n.pt in the cache, if any)')
-    parser.add_argument('--bag', help='bag written by scenario_to_bag or session_to_bag with --boxes (default: the '
+    parser.add_argument('--bag', help='bag written by scenario_to_bag --boxes (default: the '
                         'first %d images of the demo)' % IMAGES)
     parser.add_argument('--separate', action='store_true', help='run each node in a process of its own')

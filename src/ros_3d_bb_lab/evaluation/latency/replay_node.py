@@ -26,7 +26,7 @@ class ReplayParams(NamedTuple):
 class ReplayNode(object):
     """Play the images of a bag forwards and backwards, which avoids jumps, with the time of publication as stamp.
 
-    The bag must be from `scenario_to_bag` or `session_to_bag`. Parameters: see `ReplayParams`; launch/latency.launch.
+    The bag must be from `scenario_to_bag`. Parameters: see `ReplayParams`; launch/latency.launch.
     """
 
     def __init__(self):
