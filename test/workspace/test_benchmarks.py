@@ -1,4 +1,3 @@
-import io
 import json
 import os
 import signal
@@ -10,7 +9,6 @@ import pytest
 
 from ros_3d_bb_lab.evaluation.latency.latency_probe_node import LatencyProbeNode
 from ros_3d_bb_lab.evaluation.navigation.benchmark import MODES
-from ros_3d_bb_lab.evaluation.progress import with_progress
 from support.bags import scene_bag
 from support.launching import loaded
 from support.masterless import masterless
@@ -55,14 +53,6 @@ def test_a_latency_probe_that_is_shut_down_early_writes_no_record(tmp_path, chec
         node._arrivals['markers'].extend([(0, 0)] * checks)
         node.measure()
     assert os.listdir(str(tmp_path)) == [] and not answers
-
-
-def test_progress_is_shown_on_a_terminal_only():
-    for is_terminal in (True, False):
-        stream = io.StringIO()
-        stream.isatty = lambda: is_terminal
-        assert list(with_progress(range(3), stream)) == [0, 1, 2]
-        assert (stream.getvalue().count('\r'), '100 %\n' in stream.getvalue()) == (3 * is_terminal, is_terminal)
 
 
 @pytest.mark.long

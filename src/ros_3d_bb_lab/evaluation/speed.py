@@ -28,7 +28,6 @@ from ros_3d_bb.tracking.types import CameraView, Detection, detections_from_boxe
 from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker
 from ros_3d_bb_lab.evaluation.baselines.published_code import PublishedCode, load_published
 from ros_3d_bb_lab.evaluation.defaults import data_folder, describe_machine, in_range
-from ros_3d_bb_lab.evaluation.progress import with_progress
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb_lab.evaluation.text_table import line_of, table_of
 
@@ -98,11 +97,9 @@ class Ours(object):
         self._view = CameraView(FIXED_FROM_CAMERA, crowd.camera, depth_at=depth_at)
 
     def estimate(self, depth, rects_px):
-        """3D boxes in the frame of the camera."""
         return list(filter(plausible, estimate_boxes(depth, rects_px, self._camera, self._estimator)))
 
     def track(self, stamp_ns, boxes):
-        """Update the tracks with one image. Returns the tracks."""
         detections = detections_from_boxes(dict(enumerate(boxes)), FIXED_FROM_CAMERA)
         return self._tracker.update(stamp_ns, detections, self._view)
 
@@ -119,13 +116,11 @@ class Theirs(object):
         self._camera, self._tracker = crowd.camera, OriginalTracker()
 
     def estimate(self, depth, rects_px):
-        """3D boxes in the frame of the camera."""
         geometry = ImageGeometry(self._camera, (0, 0) + self._camera[:2])
         boxes = estimator_named('median').estimate(depth, rects_px, geometry, None)
         return [box for box in boxes if box is not None]
 
     def track(self, stamp_ns, boxes):
-        """Update the tracks with one image. Returns the predicted positions by ID."""
         detections = [Detection(transform_points(FIXED_FROM_CAMERA, box.center_m), box.size_m) for box in boxes]
         return {track.id: track.position_m + AHEAD_S * track.velocity_mps
                 for track in self._tracker.step(stamp_ns, detections)}
@@ -170,7 +165,7 @@ def _times_ms(crowds, kinds, images, random):
     """CPU times of the images, (images, crowds, algorithms, stages); `kinds` create an algorithm for a crowd."""
     algorithms = [[kind(crowd) for kind in kinds] for crowd in crowds]
     times_ms = np.empty((images + WARM_UPS, len(crowds), len(kinds), len(STAGES)))
-    for image in with_progress(range(len(times_ms))):
+    for image in range(len(times_ms)):
         for number, crowd in enumerate(crowds):
             rects_px = crowd.jittered(random)
             for turn in range(len(kinds)):
@@ -190,7 +185,6 @@ def _time_ms(algorithm, depth, rects_px, stamp_ns):
 
 
 def run(arguments):
-    """Measure the times."""
     with tempfile.TemporaryDirectory() as folder:
         session = read_session(arguments.data or write_simulated_session(folder, *SIMULATED))
         result = speed(session, OBJECTS, arguments.images, arguments.published)

@@ -142,14 +142,12 @@ def thesis_frames(_arguments):
 
 
 def pedestrians(_arguments):
-    """Scores of tracks of the recorded pedestrians, from a standing and a driving robot."""
     runs = [simulate(sequence, motion, (0, 0), seconds=PEDESTRIANS_S)
             for sequence in read_sequences(data_folder('trajectories')) for motion in (STANDING, DRIVING)]
     yield functools.partial(_track_scores, [run._replace(images=run.images[::PEDESTRIANS_EVERY]) for run in runs])
 
 
 def kitti(_arguments):
-    """Scores of tracks of the recorded detections."""
     yield functools.partial(_track_scores, list(read_recordings(data_folder('kitti'))))
 
 
@@ -231,7 +229,6 @@ def run(arguments):
 
 
 def _table_of(benchmark, rows):
-    """Lines of the table of one benchmark."""
     base = rows['']
     texts = [['without ' + name] + ['=' if row[key] == base[key] else '%+.4g' % (row[key] - base[key]) for key in base]
              for name, row in rows.items() if name]

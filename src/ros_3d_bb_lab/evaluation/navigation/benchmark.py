@@ -37,7 +37,6 @@ def run_trial(scene, mode, seed, folder, arguments):
 
 
 def run(arguments):
-    """Run all trials."""
     names = [TRUE_BOXES] + without_weights()
     if arguments.detector not in names and not os.path.isfile(arguments.detector):
         raise ValueError('--detector %s: %s or the path of a file expected' % (arguments.detector, ', '.join(names)))

@@ -32,8 +32,6 @@ WARM_UP_S, LONGEST_S = 1.0, 30.0  # of the published time: with standing people 
 
 @parameters()
 class NavigationTrialParams(NamedTuple):
-    """Parameters of navigation_trial_node."""
-
     scenario: str = Param('')
     record: str = Param('')
     goal_x: float = Param(0.0, limits=(-1000, 1000))
@@ -88,7 +86,6 @@ class NavigationTrialNode(object):
         rospy.Subscriber(topic, kind, lambda message: self._pace.heard(source, message.header.stamp.to_nsec()))
 
     def run(self):
-        """Run the trial and write the record."""
         self._map_pub.publish(map_message(self._scenario.room))
         worker = threading.Thread(target=self._run, daemon=True)  # publishing in the main thread can block on SIGINT
         worker.start()
@@ -169,7 +166,6 @@ class NavigationTrialNode(object):
 
 
 def map_message(room):
-    """Convert a scenario.Room to a map."""
     cells = occupancy(room)
     origin = Pose(Point(room.bounds[0], room.bounds[2], 0), Quaternion(0, 0, 0, 1))
     return OccupancyGrid(Header(frame_id=MAP_FRAME), MapMetaData(

@@ -30,11 +30,9 @@ class Pace(object):
 
     @property
     def sources(self):
-        """Names of the sources heard so far."""
         return set(self._heard_ns)
 
     def heard(self, source, time_ns):
-        """Note that a source has processed its inputs up to a time."""
         self._heard_ns[source] = time_ns
 
     def start(self, time_ns, needed):
@@ -67,7 +65,6 @@ class VisiblePeople(object):
 
 
 def distance_m(one, other):
-    """Distance of two positions in the plane."""
     return float(np.hypot(*np.subtract(one, other)))
 
 

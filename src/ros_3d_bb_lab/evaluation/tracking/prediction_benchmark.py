@@ -112,7 +112,6 @@ def scores_of(clips, rate_hz, noise_m=0.0, seed=0):
 
 
 def _clip_errors(tracker, recorded_s, recorded_m, rate_hz, noise_m, random):
-    """As `_person_errors`, of a clip at a rate with noise, and with the speed of the track."""
     count = int((recorded_s[-1] - recorded_s[0]) * rate_hz + 1e-6) + 1
     times_s = recorded_s[0] + np.arange(count) / rate_hz
     true_m = np.column_stack([np.interp(times_s, recorded_s, values_m) for values_m in recorded_m.T])

@@ -234,7 +234,6 @@ def view_of(pose, camera):
 
 
 def detection_of(box, view, camera):
-    """Detection of a box from a camera with this view."""
     rotation = view.fixed_from_camera[:3, :3]
     point_m = (-box.depth_m * np.tan(box.bearing), CAMERA_HEIGHT_M - box.height_m / 2, box.depth_m)
     covariance_m2 = rotation.dot(camera.covariance_m2(box.bearing, box.depth_m)).dot(rotation.T)
