@@ -10,7 +10,7 @@ import rospy
 import tf2_ros
 from sensor_msgs.msg import Image
 from std_msgs.msg import Empty, Int32MultiArray
-from std_srvs.srv import SetBool, Trigger, TriggerResponse
+from std_srvs.srv import Trigger, TriggerResponse
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
@@ -27,21 +27,18 @@ from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.pipeline.transform_buffer import upright_transform
 from ros_3d_bb.sessions.burst import Burst
 from ros_3d_bb.sessions.snapshots import ColorImage, Snapshots
-from ros_3d_bb.sessions.session_writer import append, remove
+from ros_3d_bb.sessions.session_writer import append
 from ros_3d_bb.visualization.cv_window import Window
 from ros_3d_bb.visualization.image_overlay import DEPTH_RANGE_M
 from ros_3d_bb.visualization.viewer_layout import FrameRate, compose, draw_countdown, text_image
 
 CAMERA_INFO_TOPIC = INFO_TOPICS[0]
-ENABLE_SERVICE = 'detector/enable'
-KEYS = 'keys: s save    t timer    d delete the last one    p pause the detector    q quit'
+KEYS = 'keys: s save    t timer    q quit'
 TIMER_PERIOD_S = 0.1
 
 
 @parameters()
 class ViewerParams(NamedTuple):
-    """Parameters of viewer_node."""
-
     session: str = Param('')
     label: str = Param('')
     window: bool = Param(True)
@@ -91,13 +88,6 @@ class ViewerNode(object):
     ~capture : std_srvs/Trigger
         Appends the newest image and its boxes to the session, as the key `s` does. The response names the stored
         measurement or the reason for the failure.
-    ~delete_last : std_srvs/Trigger
-        Deletes the newest measurement that was stored since the start of the node, as the key `d` does.
-
-    Calls
-    -----
-    detector/enable : std_srvs/SetBool
-        Pauses and resumes the detector, by the key `p`.
     """
 
     def __init__(self):
@@ -110,11 +100,10 @@ class ViewerNode(object):
         self._transforms = Transforms(wait_s=0) if self._params.floor_frame else None
         self._lock, self._capture_lock = threading.Lock(), threading.Lock()
         self._rate, self._received_topics, self._answer = FrameRate(), set(), ''
-        self._captured_ns, self._is_warned, self._is_paused = None, False, False
-        self._label, self._diagnostics, self._stored_ids = self._params.label, Diagnostics(), []
+        self._captured_ns, self._is_warned = None, False
+        self._label, self._diagnostics = self._params.label, Diagnostics()
         self._burst = Burst(self._params.timer_delay, self._params.timer_count, self._params.timer_interval)
-        for name, action in (('~capture', self.capture), ('~delete_last', self.delete_last)):
-            rospy.Service(name, Trigger, lambda _request, action=action: TriggerResponse(*action()))
+        rospy.Service('~capture', Trigger, lambda _request: TriggerResponse(*self.capture()))
         rospy.Timer(rospy.Duration(TIMER_PERIOD_S), self._on_timer, reset=True)
         # not recorded as an input, whose silence would be reported
         rospy.Subscriber('~timer', Empty, lambda _message: self._burst.toggle(time.monotonic()), queue_size=1)
@@ -176,29 +165,15 @@ class ViewerNode(object):
 
     def capture(self):
         """Append the newest image and its boxes to the session. Returns whether it was stored, and a message."""
-        return self._change_session(self._stored, 'saved')
-
-    def delete_last(self):
-        """Delete the newest measurement that this node has stored. Returns whether it was deleted, and a message."""
-        return self._change_session(self._deleted, 'deleted')
-
-    def _change_session(self, change, what):
         with self._capture_lock:
             try:
-                done, self._answer = True, change()
+                done, self._answer = True, self._stored()
                 rospy.loginfo('%s', self._answer)
-                self._diagnostics.count('measurements %s' % what)
+                self._diagnostics.count('measurements saved')
             except (ValueError, OSError) as error:
-                done, self._answer = False, 'not %s: %s' % (what, error)
-                self._diagnostics.warn('measurements not %s' % what, self._answer)
+                done, self._answer = False, 'not saved: %s' % error
+                self._diagnostics.warn('measurements not saved', self._answer)
             return done, self._answer
-
-    def _deleted(self):
-        """Delete the newest measurement of this node and return a message. Raises ValueError or OSError on failure."""
-        if not self._stored_ids:
-            raise ValueError('no measurement was stored since the start')
-        remove(self._params.session, self._stored_ids[-1])
-        return 'deleted %s' % self._stored_ids.pop()
 
     def _stored(self):
         """Store the newest snapshot and return a message about it. Raises ValueError or OSError on failure."""
@@ -209,7 +184,6 @@ class ViewerNode(object):
         label = self._read_label()
         name, count = append(self._params.session, snapshot, label)
         self._captured_ns = snapshot.stamp_ns
-        self._stored_ids.append(name)
         found = ('without 3D boxes' if snapshot.boxes3d is None else
                  'with %d 3D box%s' % (len(snapshot.boxes3d), '' if len(snapshot.boxes3d) == 1 else 'es'))
         return 'saved %s %s%s: number %d in %s' % (name, found, label and ', label %s' % label, count,
@@ -253,28 +227,13 @@ class ViewerNode(object):
             return 'no messages received on %s' % ', '.join(missing)
         return 'no depth image with the stamp of a colour image received on %s' % rospy.resolve_name(DEPTH_TOPIC)
 
-    def pause_or_resume(self):
-        """Pause or resume the detector, and show the result in the window."""
-        try:
-            answer = rospy.ServiceProxy(ENABLE_SERVICE, SetBool)(self._is_paused)
-        except rospy.ServiceException as error:
-            self._answer = 'the detector cannot be paused: the service %s does not respond (%s)' % (
-                rospy.resolve_name(ENABLE_SERVICE), error)
-            rospy.logwarn('%s', self._answer)
-            return
-        self._answer = answer.message
-        if answer.success:
-            self._is_paused = not self._is_paused
-            self._is_warned = self._is_paused  # the user paused the detector and expects no boxes
-
     def run(self):
         """Show the window until it is closed or ROS shuts down. Runs in the main thread, which must not publish."""
         if self._window is None:
             rospy.spin()
             return
         with ThreadPoolExecutor(1) as others:  # on exit, waits for measurements that are being stored
-            actions = {'s': self.capture, 'd': self.delete_last, 'p': self.pause_or_resume,
-                       't': lambda: self._burst.toggle(time.monotonic())}
+            actions = {'s': self.capture, 't': lambda: self._burst.toggle(time.monotonic())}
             shown, key = None, ''
             while not (rospy.is_shutdown() or key == 'q' or self._window.is_closed):
                 due_s = time.monotonic() + 1 / self._params.window_rate
@@ -282,8 +241,6 @@ class ViewerNode(object):
                 key = self._window.key(max(1, int(1000 * (due_s - time.monotonic())))).lower()  # with Caps Lock, too
                 if key in actions:
                     others.submit(actions[key]).add_done_callback(_complain)
-            if self._is_paused and not rospy.is_shutdown():
-                others.submit(self.pause_or_resume)
         self._window.close()
         if not rospy.is_shutdown():
             rospy.signal_shutdown('the window was closed')
@@ -298,7 +255,7 @@ class ViewerNode(object):
             return None
         label, countdown = self._read_label(), self._burst.text(time.monotonic())
         content = (snapshot.stamp_ns, snapshot.boxes2d, snapshot.boxes3d is None, rate_hz == 0, self._answer,
-                   self._is_paused, label, countdown)
+                   label, countdown)
         if content == shown:
             return shown
         lines = ('%.1f images/s    stamp %d.%09d    %s' % ((rate_hz,) + divmod(snapshot.stamp_ns, NS) + (
@@ -311,9 +268,7 @@ class ViewerNode(object):
         return content
 
     def _warnings(self, snapshot, is_early, rate_hz):
-        if self._is_paused:
-            yield 'the detector is paused'
-        elif snapshot.boxes3d is None and not is_early:
+        if snapshot.boxes3d is None and not is_early:
             yield 'no 3D boxes on %s' % rospy.resolve_name(BOXES3D_TOPIC)
         if rate_hz == 0:
             yield 'no new images on %s' % rospy.resolve_name(COLOR_TOPIC)
