@@ -47,11 +47,9 @@ class Document(object):
         return True
 
     def color(self, index):
-        """Read the colour image of a measurement, see `read_color`."""
         return read_color(self._usable(index), self.camera)
 
     def depth(self, index):
-        """Read the depth image of a measurement, see `read_depth`."""
         return read_depth(self._usable(index), self._session)
 
     def known_errors(self, index):
@@ -91,7 +89,6 @@ class Document(object):
         self._annotated.extend(indices)
 
     def clear_truth(self, index):
-        """Remove the truth of the selected person."""
         self._edit((index, {'truth_mm': None}))
 
     def last_truth(self, index):
@@ -128,7 +125,6 @@ class Document(object):
         self._edit((index, changes_of(entry, people + [detection], len(people))))
 
     def delete_box(self, index):
-        """Delete the selected box and its truth."""
         measurement, entry = self.measurements[index], self._content['frames'][index]
         if measurement.person is None:
             raise ValueError('measurement %s has no box' % measurement.id)
@@ -137,7 +133,6 @@ class Document(object):
         self._edit((index, changes_of(entry, people, None)))
 
     def reject(self, indices, reason):
-        """Reject measurements, which is undone in one step."""
         if not reason.strip():
             raise ValueError('a reason is needed to reject a measurement')
         self._edit(*((index, {'rejected': reason.strip()}) for index in indices))
@@ -153,7 +148,6 @@ class Document(object):
         return self._step(self.undo_steps, self.redo_steps)
 
     def redo(self):
-        """Redo the last undone edit. Returns the same as `undo`."""
         return self._step(self.redo_steps, self.undo_steps)
 
     def _changes_with_truth(self, index, truth_mm):

@@ -16,7 +16,6 @@ class Edits(object):
         self._window = window
 
     def enter_truth(self, truth_m):
-        """Set the truth (x, y, z) of the selected measurements, and go to the next measurement."""
         self._enter_truth(self._window.selection, truth_m)
 
     def enter_for_label(self):
@@ -28,7 +27,6 @@ class Edits(object):
                                            and other.detections)])
 
     def same_as_last(self):
-        """Set the truth of the last annotated measurement, and go to the next measurement."""
         self._enter_read(lambda: self._window.document.last_truth(self._window.current), self._window.selection)
 
     def clear_truth(self):
@@ -37,7 +35,6 @@ class Edits(object):
         self._window.pane.truth.begin()
 
     def ask_reject(self):
-        """Ask for a reason, reject the selected measurements, and go to the next one."""
         indices = self._window.selection
         reason = dialogs.ask_reason(self._window, [self._window.document.measurements[index].id for index in indices])
         if reason:

@@ -19,8 +19,6 @@ MAX_CANDIDATES = 30000  # maximum number of boxes before suppression, as in ultr
 
 @parameters('Detector yolov5')
 class DetectionParams(NamedTuple):
-    """What counts as a detection."""
-
     classes: list = Param(('person',), 'Classes to detect: names or numbers of the model.', live=True)
     confidence: float = Param(
         0.25, 'Smallest score of a detection (of YOLOv5 and YOLOX, objectness times class score).', limits=(0, 1),
@@ -56,20 +54,12 @@ class Placement(NamedTuple):
 class NetworkDetector(object):
     """Detector that runs a network.
 
-    Parameters
-    ----------
-    network
-        A backend of `detection.yolov5.backends` or an `onnx.onnx_model.OnnxModel`. Its method `candidates` takes an
-        RGB image (height, width, 3), uint8, and a confidence, and returns the Detections above it in pixels of this
-        image, in any order. Its attributes are `names`, the class names; `stride`, of which height and width must be
-        multiples; `input_hw`, the only (height, width) that it accepts, or None if it accepts any; `padding`, see
-        `fit_image`; `suppressed`, whether it suppresses overlapping boxes itself; and `description`, a text for logs.
-    params : DetectionParams
-
-    Raises
-    ------
-    ValueError
-        If there is no class to detect, or the model does not have one of the classes.
+    `network` is a backend of `detection.yolov5.backends` or an `onnx.onnx_model.OnnxModel`. Its method `candidates`
+    takes an RGB image (height, width, 3), uint8, and a confidence, and returns the Detections above it in pixels of
+    this image, in any order. Its attributes are `names`, the class names; `stride`, of which height and width must be
+    multiples; `input_hw`, the only (height, width) that it accepts, or None if it accepts any; `padding`, see
+    `fit_image`; `suppressed`, whether it suppresses overlapping boxes itself; and `description`, a text for logs.
+    Raises ValueError if there is no class to detect, or the model does not have one of the classes.
     """
 
     def __init__(self, network: Any, params: DetectionParams = DetectionParams()) -> None:

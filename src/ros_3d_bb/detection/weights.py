@@ -51,6 +51,5 @@ def names_beside(onnx_path):
 
 
 def _names_in(content):
-    """The list of the only key `names`; [] if the content is anything else."""
     is_names = isinstance(content, dict) and list(content) == ['names'] and isinstance(content['names'], list)
     return content['names'] if is_names else []

@@ -26,8 +26,6 @@ KINDS = {'scan': LaserScan, 'points': PointCloud2, 'depth': Image}
 
 @parameters()
 class PeopleRemovalParams(NamedTuple):
-    """Parameters of people_removal_node."""
-
     inputs: list = Param(('scan',), choices=tuple(KINDS))
     timeout: float = TRACKS_TIMEOUT
     margin: float = Param(

@@ -113,7 +113,6 @@ class TrackerNode(object):
             self._stage.views[camera_name].add_depth(message, arrival_clock_ns())
 
     def on_frame(self, message, depth_msg):
-        """Process the 3D boxes and the depth image of a frame."""
         if self._uses_depth:
             self._on_depth(depth_msg, '')
         self._on_boxes(message)

@@ -62,5 +62,4 @@ def open_named(events: EventCounter, params: DetectorParams, *own: Any) -> Detec
 
 
 def without_weights() -> List[str]:
-    """The names of the detectors that need no weights."""
     return [name for name, row in DETECTORS.items() if not row.suffixes]

@@ -57,12 +57,10 @@ def grid(input_hw, strides):
 
 
 def cell_count(input_hw, strides):
-    """Number of the cells of `grid`."""
     return sum(-(-input_hw[0] // stride) * -(-input_hw[1] // stride) for stride in strides)
 
 
 def is_probability(scores):
-    """Whether scores are after the sigmoid."""
     return not scores.size or (scores.min() >= 0 and scores.max() <= 1)
 
 

@@ -103,7 +103,6 @@ class OnnxModel(object):
 
 
 def _preprocessing(dtype, head):
-    """Function that converts an RGB image to a batch (1, 3, height, width) for networks with this head."""
     return functools.partial(batch_of, order=BGR if head.color == 'bgr' else RGB, dtype=dtype,
                              scale=1.0 if dtype == np.uint8 else head.scale)
 

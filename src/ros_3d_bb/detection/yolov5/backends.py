@@ -45,19 +45,7 @@ class RuntimeParams(NamedTuple):
 def open_detector(weights, detection=DetectionParams(), running=RuntimeParams(), warn=warnings.warn):
     """Open a network as the nodes do, and return it as a `network_detector.NetworkDetector`.
 
-    Parameters
-    ----------
-    weights : str
-        Path of the checkpoint or exported network.
-    detection : network_detector.DetectionParams
-    running : RuntimeParams
-    warn : callable
-        Called with the text of each warning.
-
-    Raises
-    ------
-    ValueError
-        If the network cannot be used.
+    `warn` is called with the text of each warning. Raises ValueError if the network cannot be used.
     """
     detector = NetworkDetector(open_runtime(os.path.abspath(os.path.expanduser(weights)), running, warn), detection)
     detector.detect(np.zeros((480, 640, 3), np.uint8))  # the first detection takes several times as long as others

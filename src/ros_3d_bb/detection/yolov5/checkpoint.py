@@ -44,7 +44,6 @@ def read_checkpoint(path):
 
 
 def unreadable(path, error):
-    """WeightsError for an OSError."""
     return WeightsError('weights %s: cannot be read (%s); %s' % (path, error.strerror, EXPECTED))
 
 

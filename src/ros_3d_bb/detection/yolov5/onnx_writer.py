@@ -50,7 +50,6 @@ class Graph(object):
 
 
 def _value(name, element, shape):
-    """ValueInfoProto of a tensor."""
     dimensions = [_fields((2, size)) if isinstance(size, str) else _fields((1, size)) for size in shape]
     return _fields((1, name), (2, _fields((1, _fields((1, element), (2, _fields((1, dimensions))))))))
 

@@ -88,7 +88,6 @@ def _connection_problem(master, node, topic):
 
 
 def _published_type(uri, topic):
-    """Return the type and md5sum with which a node publishes a topic."""
     node = xmlrpc.client.ServerProxy(uri, transport=_Transport())
     _code, _text, (_protocol, host, port) = node.requestTopic(rospy.get_name(), topic, [['TCPROS']])
     with contextlib.closing(socket.create_connection((host, port), TIMEOUT_S)) as connection:

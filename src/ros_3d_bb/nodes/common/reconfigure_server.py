@@ -72,12 +72,10 @@ class ReconfigureServer(object):
         self._params = params
 
     def _values(self):
-        """Return {name: value} in the types of the parameter server, with lists instead of tuples."""
         return {name: list(value) if isinstance(value, tuple) else value
                 for each in self._params for name, value in each._asdict().items()}
 
     def _store_changes(self, known):
-        """Set the live parameters that differ from `known` on the parameter server. Returns their names."""
         values = self._values()
         changed = [name for name in self._live if name not in known or known[name] != values[name]]
         for name in changed:
@@ -90,7 +88,6 @@ class ReconfigureServer(object):
 
 
 def live_in(kinds):
-    """Return the live parameters of NamedTuple types, {name: Param}."""
     return {name: param for name, param in table_of(kinds).items() if param.live}
 
 
