@@ -29,8 +29,7 @@ ROBOT_NODES = ['camera_mount', 'people_node', 'planner_bridge_node', 'realsense_
 # remapping, and `COSTMAP layers`.
 CASES = [
     (MEASURE, {'nodes': ['people_node', 'viewer_node'], '/viewer_node/session': '/a session',
-               '/viewer_node/window': True, '/tracker_node/target_frame': 'map',
-               'viewer_node:detector/enable': 'detector_node/enable'}),
+               '/viewer_node/window': True, '/tracker_node/target_frame': 'map'}),
     (MEASURE + 'camera:=true driver:=pyrealsense2', {'nodes': ['people_node', 'realsense_node', 'viewer_node']}),
     (MEASURE + 'camera_image:=a/color bb_topic:=a/boxes', {
         'viewer_node:camera/color/image_raw': 'a/color', 'people_node:camera/color/image_raw': 'a/color',
