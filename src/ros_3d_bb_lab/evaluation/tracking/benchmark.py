@@ -13,7 +13,6 @@ from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker,
 from ros_3d_bb_lab.evaluation.defaults import data_folder, in_range
 from ros_3d_bb_lab.evaluation.text_table import line_of, table_of, transposed
 from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
-from ros_3d_bb_lab.evaluation.tracking.prediction_benchmark import predictions
 from ros_3d_bb_lab.evaluation.tracking.recorded_detections import read_recordings
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING, STANDING
 from ros_3d_bb_lab.evaluation.tracking.run_generator import SECONDS, simulate
@@ -80,12 +79,10 @@ def run(arguments):
             for sequence in sequences for motion in (STANDING, DRIVING) for repetition in range(arguments.repetitions))
     if arguments.rates:
         return _run_at_rates(list(runs))
-    trackers, prediction = compare(runs, CONTESTANTS), predictions(sequences)
-    print('\n'.join(table_of(transposed(trackers)) + ['predictions from true positions:']
-                    + table_of(transposed(prediction))))
+    trackers = compare(runs, CONTESTANTS)
+    print('\n'.join(table_of(transposed(trackers))))
     return {'sequences': names, 'recorded': bool(arguments.data), 'seed': arguments.seed,
-            'repetitions': arguments.repetitions, 'seconds': arguments.seconds, 'trackers': trackers,
-            'prediction': prediction}
+            'repetitions': arguments.repetitions, 'seconds': arguments.seconds, 'trackers': trackers}
 
 
 def _run_on_detections(arguments):

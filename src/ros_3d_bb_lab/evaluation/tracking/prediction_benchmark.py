@@ -22,8 +22,6 @@ from ros_3d_bb_lab.evaluation.tracking.trajectories import read_rows
 PARAMS = TrackerParams(outlier_share=0.0, new_target_density=1e-9)
 HORIZON_S = 2.0
 SIZE_M = np.array([0.5, 0.5, 1.7])
-OBSERVED = 8  # steps of a sequence before predictions count
-MAX_STEP_ERROR_S = 0.05  # largest deviation of the time of a future position in a sequence
 COLUMNS = ('timestamp', 'x', 'y')
 AS_RECORDED_HZ = 10  # rate of the main result
 RATES_HZ = (30, 15, 10, 5, 3)
@@ -34,41 +32,8 @@ STANDING_MPS = 0.3  # people stand whose tracks are slower; chosen
 KEYS = 'cv_fde_2s_m', 'coverage_95_2s', 'ours_fde_2s_m', 'area_95_2s_m2'
 
 
-def predictions(sequences):
-    """Errors of predictions from the true positions of each `trajectories.Sequence`, as written by --json.
-
-    As in Schöller et al., What the Constant Velocity Model Can Teach Us About Pedestrian Motion Prediction (RA-L 2020),
-    a person is observed for 8 steps of the recording, and the constant velocity is that of the last step. Each later
-    position with a known future counts.
-
-    Returns {name: {cv_fde_2s_m, ours_fde_2s_m, ours_coverage_95_2s}}, and their means as 'mean'; None without data.
-    """
-    scores = {}
-    for sequence in sequences:
-        tracker = Tracker(PARAMS)
-        people = sorted(sequence.pedestrians, key=lambda person: person.start_s)
-        rows = [row for person in people for row in _person_errors(tracker, person)]
-        cv_m, is_inside, ours_m, _area = np.reshape(rows, (-1, 4)).T
-        scores[sequence.name] = {'cv_fde_2s_m': _mean(cv_m), 'ours_fde_2s_m': _mean(ours_m),
-                                 'ours_coverage_95_2s': _mean(is_inside)}
-    known = [values for values in scores.values() if values['cv_fde_2s_m'] is not None]
-    if known:
-        scores['mean'] = {key: _mean([values[key] for values in known]) for key in known[0]}
-    return scores
-
-
 def _mean(values):
     return float(np.mean(values)) if len(values) else None
-
-
-def _person_errors(tracker, person):
-    """Yield the error of the constant velocity, metres, and the `_errors` of the tracker, for each prediction."""
-    times_s, points_m = person.times_s, person.points_m
-    for row, track in enumerate(tracked(tracker, times_s, points_m)):
-        later = np.flatnonzero(np.abs(times_s - times_s[row] - HORIZON_S) < MAX_STEP_ERROR_S)
-        if row + 1 >= OBSERVED and len(later) and track is not None:
-            future_m = points_m[later[0]]
-            yield (_constant_error_m(times_s, points_m, row, 1, future_m),) + _errors(future_m, *_predicted(track))
 
 
 def read_clips(folder):
