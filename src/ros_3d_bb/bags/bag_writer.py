@@ -1,15 +1,13 @@
-"""Write bags with the messages of a camera on a robot, for example from measurement sessions."""
-import argparse
+"""Write bags with the messages of a camera on a robot, and read their images."""
 import collections
 import contextlib
 import os
-import sys
-from typing import Any, Callable, Dict, Iterable, Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterable, Iterator, List, Sequence, Tuple
 
 import rosbag
 
 from ros_3d_bb.conversions.perception_msgs import time_from
-from ros_3d_bb.core.atomic_file import clean_up_on_sigterm, replacement_of
+from ros_3d_bb.core.atomic_file import replacement_of
 from ros_3d_bb.core.time_sync import NS
 
 PARTIAL = '.active'  # suffix of incomplete bags, as in rosbag record
@@ -63,21 +61,3 @@ def images_in(path: str, topics: Sequence[str]) -> List[List[Tuple[str, Any]]]:
     if not images:
         raise ValueError('the bag %s has no messages on %s' % (path, ', '.join(sorted(topics))))
     return list(images.values())
-
-
-def bag_command_parser(name: str, doc: Optional[str]) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog=name, description=(doc or '').split(': ', 1)[-1])
-    parser.add_argument('--compression', choices=('none', 'bz2', 'lz4'), default='lz4', help='default: lz4')
-    return parser
-
-
-def write_bag_of_command(parser: argparse.ArgumentParser, arguments: argparse.Namespace,
-                         images: Callable[[], Iterable[Any]]) -> None:
-    """Write the bag of a command. Print the cause and exit with 1 if a session or a scenario cannot be read."""
-    clean_up_on_sigterm()
-    try:
-        count = write_bag(images(), arguments.bag, arguments.compression)
-    except (ValueError, OSError) as error:
-        print('%s: %s; no bag was written' % (parser.prog, error), file=sys.stderr)
-        sys.exit(1)
-    print('%s: %d images' % (arguments.bag, count))
