@@ -10,7 +10,8 @@ import rosbag
 import rospy
 from std_msgs.msg import Header
 
-from ros_3d_bb.bags.bag_writer import START_NS, write_bag
+from ros_3d_bb.bags.bag_writer import write_bag
+from ros_3d_bb.conversions.camera_msgs import START_NS
 from ros_3d_bb.conversions.perception_msgs import boxes2d_to_msg, time_from, tracks_from_msg, tracks_to_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb_lab.evaluation.demo.scene_report import (BOXES_TOPIC, TRACKS_TOPIC, main, paths_of, read_recording,
