@@ -79,5 +79,6 @@ def scenario_to_bag():
         images = itertools.islice(scenario_images(scenario, arguments.boxes), arguments.images)
         count = write_bag(images, arguments.bag, arguments.compression)
     except (ValueError, OSError) as error:
-        sys.exit('scenario_to_bag: %s; no bag was written' % error)
+        print('scenario_to_bag: %s; no bag was written' % error, file=sys.stderr)
+        sys.exit(1)
     print('%s: %d images' % (arguments.bag, count))
