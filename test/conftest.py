@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 settings.register_profile('repeatable', derandomize=True, database=None, deadline=None,  # on a busy machine, too
-                          suppress_health_check=[HealthCheck.too_slow])
+                          max_examples=50, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile('few', settings.get_profile('repeatable'), max_examples=20)
 settings.load_profile('repeatable')
 HERE = os.path.dirname(os.path.abspath(__file__))

@@ -33,7 +33,6 @@ rospy.init_node('other_version')
 rospy.Publisher('%s', Int32MultiArray, queue_size=1)
 rospy.spin()
 """
-TWO_YEARS_NS = 63000000 * NS
 
 
 class Rig(object):
@@ -88,8 +87,6 @@ def messages_at(stamp_ns):
 FAULTS = {
     'no tf': (lambda _stamp_ns: {'tf': None}, 'tracker_node',
               'the transform from camera to base_link ends', 'tf has no frames', 'robot_state_publisher'),
-    'stamps of two years ago': (lambda stamp_ns: messages_at(stamp_ns - TWO_YEARS_NS), 'bbox3d_node',
-                                '729.2 days before ROS time', '729.2 days before ROS time', 'use_sim_time'),
     'no boxes': (lambda _stamp_ns: {BOXES: None}, 'bbox3d_node', 'no messages on /yolo_bounding_box',
                  'no messages on /yolo_bounding_box', 'enable')}
 
@@ -129,16 +126,6 @@ def test_a_healthy_graph_has_no_faults(healthy):
     lines = process.stdout.splitlines()
     assert process.returncode == 0 and lines[-1] == 'doctor: no faults found', process.stdout
     assert all(line.startswith('ok ') for line in lines[:-1]) and len(lines) > 15
-
-
-def test_nodes_show_rates_latency_and_the_age_of_transforms(healthy):
-    def shows(node):
-        values = healthy.status_of(node)[2]
-        return (0 < float(values['rate'].split()[0]) < 30 and values['latency'].endswith('from stamp to result')
-                and values['input ' + DEPTH].startswith('/' + DEPTH))
-    for node in ('bbox3d_node', 'tracker_node'):
-        wait_until(lambda: shows(node), 'values of %s in a second with results' % node)
-    wait_until(lambda: abs(float(healthy.status_of('tracker_node')[2]['tf age'].split()[0])) < 5, 'a recent transform')
 
 
 @pytest.mark.parametrize('name', FAULTS)

@@ -253,8 +253,8 @@ def test_the_robot_stops_when_the_camera_stops_and_drives_on(drives):
     until(drives, lambda: drives.velocity > 0.1, STARTING_S)
 
 
-@pytest.mark.parametrize('number', [signal.SIGKILL, signal.SIGTERM])
-@pytest.mark.parametrize('node', ['tracker_node', 'planner_bridge_node'])
+@pytest.mark.parametrize('node, number', [('tracker_node', signal.SIGKILL), ('planner_bridge_node', signal.SIGTERM),
+                                          ('planner_bridge_node', signal.SIGKILL)])
 def test_the_robot_stops_when_a_node_ends_and_drives_on_when_it_is_back(drives, node, number):
     pid = pid_of(node)
     drives.is_faulty = True

@@ -8,7 +8,6 @@ from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC as COLOR, DEPTH_TOPIC as DEPTH, INFO_TOPICS
-from ros_3d_bb.conversions.perception_msgs import transform_from_msg
 from support.realsense_recordings import SKIPPED, START_MS, STEP_MS, SUFFIX, colored, sloping_depth, write_recording
 from support.ros import Recorder, started
 
@@ -50,13 +49,3 @@ def test_all_messages_of_a_frame_have_one_stamp(played):
         assert set(header.frame_id for header in headers) == {'camera_color_optical_frame'}
     clocks = [message.clock for message in played['/clock'][-len(expected):]]
     assert clocks == [image.header.stamp for image in played[COLOR]]
-
-
-def test_the_frames_of_the_camera_are_published_once_and_form_a_tree(played):
-    message, = played['/tf_static']
-    links = {link.child_frame_id: link for link in message.transforms}
-    assert {child: link.header.frame_id for child, link in links.items()} == {
-        'camera_color_frame': 'camera_link', 'camera_color_optical_frame': 'camera_color_frame',
-        'camera_depth_frame': 'camera_link', 'camera_depth_optical_frame': 'camera_depth_frame'}
-    ahead = transform_from_msg(links['camera_color_optical_frame'])[:3, 2]
-    np.testing.assert_allclose(ahead, (1, 0, 0), atol=1e-12)

@@ -1,34 +1,22 @@
-"""simulation.launch as in `./run demo`, with one and with two cameras, and the time of simulator_node. Needs a master.
+"""simulation.launch as in `./run demo`, with one and with two cameras. Needs a master.
 
-The scene with two cameras is about the names of all nodes and topics together; test_cameras.py compares its tracks with
-the truth.
+The scene with two cameras is about the names of all nodes and topics together; test_scenes_in_bags.py compares tracks
+with the truth.
 """
-import contextlib
 import os
 
 import rosbag
 import yaml
-from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import CameraInfo, Image
-from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.conversions.perception_msgs import stamp_of
-from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb_lab.evaluation.clear_mot import score
 from ros_3d_bb_lab.evaluation.demo.scene_report import read_recording
-from support.ros import Recorder, launched, started, wait_until
+from support.ros import launched
 
 SCENE = {'duration': 4.0, 'rate': 10.0, 'robot': {'moves': [{'to': [0.4, 0.0], 'speed': 0.2}]}, 'people': [
     {'start': [4.0, 0.9], 'facing': 3.0, 'moves': [{'to': [4.0, -0.6], 'speed': 0.8}]},
     {'start': [5.2, -0.8], 'facing': 2.0}]}
 TWO_CAMERAS = os.path.join(os.path.dirname(__file__), '..', '..', 'config', 'scenarios', 'two_cameras.yaml')
-RATE = 15
-COLOR = 'camera/color/image_raw'
-TOPICS = {'camera/aligned_depth_to_color/image_raw': Image, 'camera/color/camera_info': CameraInfo,
-          'camera/aligned_depth_to_color/camera_info': CameraInfo, '/tf': TFMessage, '/clock': Clock,
-          'ground_truth': TrackedObjectArray}
-IMAGE_TOPICS = {COLOR} | set(TOPICS) - {'/tf', '/clock'}
 
 
 def recorded(folder, scene, *arguments):
@@ -74,29 +62,3 @@ def test_each_camera_has_its_topics_and_the_tracks_have_one(tmp_path):
             'ros_3d_bb/bb_3d')} <= topics
     assert {'/ros_3d_bb/tracks', '/visualization_marker_array'} <= topics
     assert len(stamps) > 10 and stamps == sorted(stamps)
-
-
-def test_time_and_tf_are_published_every_20_ms_and_at_the_images(tmp_path):
-    """All messages of an image have its stamp. The scene starts once all recorders are connected."""
-    (tmp_path / 'scene.yaml').write_text(yaml.safe_dump(dict(SCENE, duration=1.0, rate=float(RATE))))
-    with contextlib.ExitStack() as stack:
-        recorders = {topic: stack.enter_context(Recorder(topic, kind, publisher_expected=False))
-                     for topic, kind in TOPICS.items()}
-        process = started('simulator_node', 'repeat:=false', 'wait_for_subscribers:=1',
-                          'scenario:=%s' % (tmp_path / 'scene.yaml'))
-        wait_until(lambda: all(recorder.is_connected for recorder in recorders.values()), 'all connections')
-        recorders[COLOR] = stack.enter_context(Recorder(COLOR, Image))  # the subscriber that the node waits for
-        assert process.wait(timeout=60) == 0
-        wait_until(lambda: all(len(recorders[topic].messages) == RATE for topic in IMAGE_TOPICS), 'all images')
-    stamps = [message.header.stamp for message in recorders[COLOR].messages]
-    images_ns = [int(round(number / RATE * NS)) for number in range(RATE)]
-    assert [(stamp - stamps[0]).to_nsec() for stamp in stamps] == images_ns
-    for topic in IMAGE_TOPICS:
-        assert [message.header.stamp for message in recorders[topic].messages] == stamps
-    transforms = [message.transforms for message in recorders['/tf'].messages]
-    assert [[link.child_frame_id for link in links] for links in transforms] == [
-        ['odom', 'base_link', 'camera_color_optical_frame']] * len(transforms)
-    times_ns = [(links[0].header.stamp - stamps[0]).to_nsec() for links in transforms]
-    assert times_ns == sorted(set(range(0, NS + 1, NS // 50)) | set(images_ns))
-    clock_ns = [(message.clock - stamps[0]).to_nsec() for message in recorders['/clock'].messages]
-    assert clock_ns == sorted(clock_ns) and clock_ns[-len(times_ns):] == times_ns

@@ -9,7 +9,7 @@ import rospy
 
 from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.conversions.camera_msgs import transform_messages
-from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth, imgmsg_to_rgb
+from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth
 
 COLOR, INFO = '/camera/color/image_raw', '/camera/color/camera_info'
 DEPTH, DEPTH_INFO = '/camera/aligned_depth_to_color/image_raw', '/camera/aligned_depth_to_color/camera_info'
@@ -20,6 +20,11 @@ OPTICAL = 'camera_color_optical_frame'
 
 def whole(topic, message, time):
     return topic, message, time
+
+
+def of_another_driver(topic, message, time):
+    return (topic.replace('/camera/color', '/cam0/rgb').replace('/camera/aligned_depth_to_color', '/cam0/depth_to_rgb'),
+            message, time)
 
 
 def without(*topics):
@@ -36,11 +41,10 @@ def each(topics, change):
     return changed
 
 
-def with_matrix(message, factor=1.0, size=1.0):
-    """Multiply the intrinsics and the image size of a camera_info."""
+def with_matrix(message, factor):
+    """Multiply the intrinsics of a camera_info."""
     message.K = [value * factor for value in message.K[:8]] + [1.0]
     message.P = [value * factor for value in message.P[:10]] + [1.0, 0.0]
-    message.width, message.height = int(message.width * size), int(message.height * size)
 
 
 def delayed(topics, by_s):
@@ -54,10 +58,9 @@ def tf_delayed(by_s):
     return each(['/tf'], change)
 
 
-def with_unit(per_mm, encoding='16UC1'):
-    kind = np.uint16 if encoding == '16UC1' else np.float32
+def with_unit(per_mm):
     return each([DEPTH], lambda message: fill_image(
-        message, (imgmsg_to_depth(message).values * per_mm).astype(kind), encoding))
+        message, (imgmsg_to_depth(message).values * per_mm).astype(np.uint16), '16UC1'))
 
 
 def in_frame(frame_id):
@@ -65,52 +68,17 @@ def in_frame(frame_id):
 
 
 def with_frames(names):
-    """Rename frames everywhere; a link from or to the name None is removed."""
+    """Rename frames everywhere."""
     def changed(topic, message, time):
         message = copy.deepcopy(message)
         if topic == '/tf':
             for link in message.transforms:
                 link.header.frame_id = names.get(link.header.frame_id, link.header.frame_id)
                 link.child_frame_id = names.get(link.child_frame_id, link.child_frame_id)
-            message.transforms = [link for link in message.transforms if link.header.frame_id and link.child_frame_id]
         elif topic in IMAGES + (TRUTH,):
-            message.header.frame_id = names.get(message.header.frame_id, message.header.frame_id) or ''
+            message.header.frame_id = names.get(message.header.frame_id, message.header.frame_id)
         return topic, message, time
     return changed
-
-
-def every(number, *topics):
-    """Keep one of so many messages on some topics."""
-    counts = dict.fromkeys(topics, -1)
-
-    def changed(topic, message, time):
-        if topic in counts:
-            counts[topic] += 1
-            if counts[topic] % number:
-                return None
-        return topic, message, time
-    return changed
-
-
-def stretched(message):
-    """Intrinsics of the depth camera in the camera_info of depth that is aligned to colour."""
-    with_matrix(message, 0.62)
-    message.K = message.K[:2] + [319.5] + message.K[3:5] + [239.5] + message.K[6:]
-
-
-def turned(topic, message, time):
-    """Images of a camera that is mounted in portrait, without its transform."""
-    message = copy.deepcopy(message)
-    if topic == COLOR:
-        fill_image(message, np.rot90(imgmsg_to_rgb(message)).copy(), 'rgb8')
-    elif topic == DEPTH:
-        fill_image(message, np.rot90(imgmsg_to_depth(message).values).copy(), '16UC1')
-    elif topic in INFOS:
-        matrix, width = list(message.K), message.width
-        message.width, message.height = message.height, message.width
-        message.K = [matrix[4], 0, matrix[5], 0, matrix[0], width - 1 - matrix[2], 0, 0, 1]
-        message.P = message.K[:3] + [0] + message.K[3:6] + [0, 0, 0, 1, 0]
-    return None if topic == '/tf' else (topic, message, time)
 
 
 def shifted(message):

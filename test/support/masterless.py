@@ -64,9 +64,8 @@ class Connections(object):
 
 
 @contextlib.contextmanager
-def masterless(params=(), names=()):
-    """Within the block, nodes can be created, with these private parameters and names of topics (dicts). Yields
-    Connections."""
+def masterless(params=()):
+    """Within the block, nodes can be created, with these private parameters (a dict). Yields Connections."""
     connections = Connections()
     replaced = {
         'rospy.Publisher': connections._publisher, 'rospy.Subscriber': connections._subscriber,
@@ -75,8 +74,8 @@ def masterless(params=(), names=()):
         'rospy.on_shutdown': mock.Mock(), 'rospy.set_param': mock.Mock(),
         'rospy.get_param': lambda name, default=None: (
             dict(params) if name == '~' else dict(params).get(name.lstrip('~'), default)),
+        'rospy.resolve_name': lambda name: '/' + name, 'rospy.is_shutdown': lambda: False,
         'rospy.get_param_cached': lambda name, default: dict(params).get(name.lstrip('~'), default),
-        'rospy.resolve_name': lambda name: dict(names).get(name, '/' + name), 'rospy.is_shutdown': lambda: False,
         'rospy.get_rostime': lambda: connections.now, 'rospy.rostime.get_rostime': lambda: connections.now,
         'rospy.logwarn_throttle': lambda _period_s, text, *arguments: text % arguments,
         'ros_3d_bb.nodes.common.subscribers._inputs': [],

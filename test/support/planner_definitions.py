@@ -2,8 +2,7 @@
 
 Types and names of the fields are those of the .msg files in the public repositories wg-perception/people,
 rst-tu-dortmund/costmap_converter, astuff/astuff_sensor_msgs (derived_object_msgs), ros-perception/vision_msgs (0.0.1
-and 0.0.2, the releases for ROS 1) and ros/common_msgs (shape_msgs). `PUBLISHED_MD5` are checksums from published code;
-ras_carla's RasObject, which contains a derived_object_msgs/Object, is only used for its checksum.
+and 0.0.2, the releases for ROS 1) and ros/common_msgs (shape_msgs). `PUBLISHED_MD5` are checksums from published code.
 """
 import functools
 import importlib
@@ -33,20 +32,11 @@ geometry_msgs/TwistWithCovariance velocities""",
 std_msgs/Header header
 costmap_converter/ObstacleMsg[] obstacles""",
     'shape_msgs/SolidPrimitive': """
-uint8 BOX=1
-uint8 SPHERE=2
 uint8 CYLINDER=3
-uint8 CONE=4
 uint8 type
 float64[] dimensions
-uint8 BOX_X=0
-uint8 BOX_Y=1
-uint8 BOX_Z=2
-uint8 SPHERE_RADIUS=0
 uint8 CYLINDER_HEIGHT=0
-uint8 CYLINDER_RADIUS=1
-uint8 CONE_HEIGHT=0
-uint8 CONE_RADIUS=1""",
+uint8 CYLINDER_RADIUS=1""",
     'derived_object_msgs/Object': """
 std_msgs/Header header
 uint32 id
@@ -77,13 +67,6 @@ uint32 classification_age""",
     'derived_object_msgs/ObjectArray': """
 std_msgs/Header header
 derived_object_msgs/Object[] objects""",
-    'ras_carla/RasObject': """
-derived_object_msgs/Object object
-float32 distance
-float32 shift_x
-float32 shift_y
-bool is_front
-float32 importance""",
     'vision_msgs/ObjectHypothesisWithPose': """
 int64 id
 float64 score
@@ -101,7 +84,6 @@ std_msgs/Header header
 vision_msgs/Detection3D[] detections"""}
 PUBLISHED_MD5 = {'people_msgs/People': '18722f4b8db20cc2369740732357847b',
                  'costmap_converter/ObstacleArrayMsg': '8a1bdcde72c65ca7d3ce8ebf52d43516',
-                 'ras_carla/RasObject': '6890397792f930487f9106664fc3bee3',
                  'vision_msgs/Detection3D': '7f3d8e29f3ab9853108801543aec1a5d',
                  'vision_msgs/Detection3DArray': '05c51d9aea1fb4cfdc8effb94f197b6f'}
 SEPARATOR = '\n' + '=' * 80 + '\n'

@@ -66,10 +66,6 @@ class Play(object):
         self.cameras, self.ahead_ns, self._due_ns = set(cameras), 0, {camera: 0 for camera in cameras}
         self._periods_ns = periods_ns
         self.faults = {}  # by camera: a function that returns by how much its stamps are ahead
-        self.respawn()
-
-    def respawn(self):
-        """Start a new stage, as where tracker_node is restarted."""
         self.rig = Rig(*sorted(self.cameras) if len(self.cameras) > 1 else [])
         self.transforms, self.counts = self.rig.transforms, self.rig.events.counts
 

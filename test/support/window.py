@@ -9,7 +9,7 @@ from ros_3d_bb_annotator.main_window import AnnotatorWindow, make_application  #
 from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets  # noqa: E402
 
 QtTest = importlib.import_module(QtCore.__name__.replace('QtCore', 'QtTest'))  # of the binding that is in use
-CONTROL, SHIFT, ALT = Qt.ControlModifier, Qt.ShiftModifier, Qt.AltModifier
+CONTROL, SHIFT = Qt.ControlModifier, Qt.ShiftModifier
 TRIES, WAIT_MS = 1000, 20
 FORGOTTEN_MS = 10000
 APPLICATION = make_application()  # Qt ends with the last reference to it

@@ -12,7 +12,6 @@ from ros_3d_bb_lab.evaluation import __main__ as command
 from ros_3d_bb_lab.evaluation.accuracy import Estimates, compare, scores_of, with_detected_boxes
 from ros_3d_bb_lab.evaluation.defaults import scenario_path
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
-from ros_3d_bb_lab.evaluation.speed import speed
 
 REAL_WEIGHTS = pytest.mark.needs(*['torch'] * bool(DATA))
 PLACES = np.repeat([(0.0, 1.0), (0.5, 2.0), (-1.0, 3.0)], 4, axis=0)
@@ -80,48 +79,3 @@ def test_a_scene_is_scored_with_each_detector(tmp_path):
     command.main(['scenes', str(tmp_path / 'scene.yaml'), '--json', str(tmp_path / 'result.json')])
     rows = json.loads((tmp_path / 'result.json').read_text())['scenes']
     assert [(row['detector'], row['recall']) for row in rows] == [('depth', 1), ('exact', 1)]
-
-
-PUBLISHED = {  # the names and calls of the published code; without its algorithms
-    'main': """import a_missing_module
-from a_missing_module import Timer
-from ros_3d_bb.msg import BoundingBox3D
-VERBOSE, USE_OPTIMIZED = True, False
-class Ros_3d_bb:
-    def bounding_box_callback(self, boxes):
-        assert USE_OPTIMIZED and not VERBOSE and self.depth_image.any() and self.intrinsics.fx > 0
-        self.bounding_boxes_3d = {number: (0.0, 0.0, float(number), 0.5, 1.7, 0.0)
-                                  for number in range(len(boxes.data) // 4)}
-""",
-    'tracker': """import predictor
-class BoundingBox:
-    def __init__(self, *numbers):
-        self.x, self.y, self.z = numbers[:3]
-class Tracker:
-    def __init__(self, _most_images):
-        self.objects = []
-    def update(self, boxes):
-        self.objects = boxes
-""",
-    'predictor': """class Predictor:
-    def __init__(self, tracker, _sensitivity):
-        self.tracker, self.predictions = tracker, {}
-    def update(self):
-        self.count = len(self.tracker.objects)
-    def predict(self, _images):
-        assert self.count == 1  # a box without depth is left out
-"""}
-
-
-def test_the_speed_of_the_published_code_is_measured_in_a_checkout(session_folder, tmp_path):
-    session = read_session(session_folder)
-    with pytest.raises(ValueError, match='tracker.py'):
-        speed(session, (2,), 1, str(tmp_path))
-    (tmp_path / 'scripts').mkdir()
-    for name, text in PUBLISHED.items():
-        (tmp_path / 'scripts' / (name + '.py')).write_text(text)
-    result = speed(session, (2,), 1, str(tmp_path))
-    assert result['published']['both_ms'][0] > 0
-    ratio = result['ours']['both_ms'][0] / result['published']['both_ms'][0]
-    assert result['ratio_published'] == pytest.approx([ratio])
-    assert 'published' not in speed(session, (1,), 1)

@@ -1,12 +1,16 @@
+import csv
 import os
+import re
 
-import cv2
-import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.sessions.session_reader import SessionError, read_session
 from ros_3d_bb_annotator.document import Document
+from ros_3d_bb_annotator.export import export
+from ros_3d_bb_annotator.lengths import parse_length
+from ros_3d_bb_annotator.marks import Mark, parse_marks
+from ros_3d_bb_lab.evaluation.noise.tables import read_table
 from support.small_session import (FAR_BOX, NEAR_BOX, NEAR_MM, change_json, read_json, write_measurement,
                                    write_small_session)
 
@@ -95,42 +99,6 @@ def test_a_box_drawn_by_hand_is_estimated_and_chosen(document, folder):
     assert read_session(folder).frames[0].boxes_px == (NEAR_BOX, FAR_BOX)
 
 
-def test_a_box_drawn_by_hand_replaces_that_of_the_same_person(document, folder):
-    change_json(folder, lambda content: content['frames'][0]['detections'][0].update(box=[10, 4, 26, 30]))
-    document.refresh()
-    document.draw_box(0, (-5, 4, 26, 44))
-    assert document.measurements[0].detections[-1].box_px == (0, 4, 26, 44)
-    document.draw_box(0, NEAR_BOX)
-    assert document.estimates.of(0)[3][2] == pytest.approx(2.09)
-    assert read_session(folder).frames[0].boxes_px == (NEAR_BOX, FAR_BOX)
-
-
-def test_the_truth_stays_with_its_person_when_boxes_are_drawn_and_deleted(document):
-    near_m, far_m = (-0.47, None, 2.0), (0.7, None, 3.0)
-    document.set_truths([0], -0.47, 2.0)
-    document.draw_box(0, (12, 6, 28, 44))  # of the same person
-    assert document.measurements[0].truths == {2: near_m}
-    document.draw_box(0, (30, 5, 38, 20))  # of another one
-    assert document.measurements[0].person == 3 and document.measurements[0].truths == {2: near_m}
-    document.set_truths([0], 0.7, 3.0)
-    assert document.measurements[0].truths == {2: near_m, 3: far_m}
-    document.delete_box(0)
-    assert document.measurements[0].truths == {2: near_m} and document.measurements[0].person == 0
-    document.set_truths([0], 0.7, 3.0)  # nobody is selected any more
-    assert document.measurements[0].truths == {1: far_m, 2: near_m}
-
-
-@pytest.mark.parametrize('break_it', [
-    lambda document: os.remove(document.measurements[0].depth_path),
-    lambda document: cv2.imwrite(document.measurements[0].depth_path, np.zeros((48, 64), np.uint16))])
-def test_truth_can_be_entered_for_a_box_that_cannot_be_estimated(document, folder, break_it):
-    change_json(folder, lambda content: content['frames'][0]['detections'][0].pop('estimate_mm'))
-    document.refresh()
-    break_it(document)
-    document.set_truths([0], 0.1, 2.0)
-    assert document.measurements[0].truth_m == (0.1, None, 2.0) and document.known_errors(0) is None
-
-
 def test_a_missing_image_is_named_and_other_measurements_can_be_annotated(folder):
     os.remove(os.path.join(folder, 'depth', 'm1.png'))
     os.remove(os.path.join(folder, 'color', 'm1.png'))
@@ -141,14 +109,6 @@ def test_a_missing_image_is_named_and_other_measurements_can_be_annotated(folder
         with pytest.raises(SessionError, match='m1.png: missing'):
             read(1)
     document.reject([1], 'no images')
-
-
-@pytest.mark.parametrize('share', [0, 0.5, 0.99])
-def test_a_truncated_image_is_named(folder, share):
-    path = os.path.join(folder, 'depth', 'm1.png')
-    os.truncate(path, int(share * os.path.getsize(path)))
-    assert [measurement.problem for measurement in Document(folder).measurements] == [
-        None, 'the end of depth/m1.png is missing', None, None]
 
 
 @pytest.mark.parametrize('break_it,problem', [
@@ -167,7 +127,54 @@ def test_an_invalid_entry_is_shown_with_its_fault(folder, break_it, problem):
     assert read_json(folder)['frames'][2]['truth_mm'] == {'x': 100, 'z': 2000}
 
 
-def test_a_session_with_an_invalid_grid_is_rejected(folder):
-    change_json(folder, lambda content: content.update(grid=[{'name': 'A', 'x': float('nan'), 'z': 1}]))
-    with pytest.raises(SessionError, match='frames.json'):
-        Document(folder)
+MARKS = (Mark('A1', -0.6, 1.5), Mark('B1', 0.0, 1.5))
+
+
+@pytest.mark.parametrize('text', [
+    'A1, -600, 1500\nB1, 0, 1500', 'name,x,z\n"A1",-600,1500\n\n"B1",0,1500\n', 'A1\t-600\t1500\r\nB1\t0\t1500',
+    'A1;-0,6 m;1,5 m\nB1;0;1500', 'Mark X Z\nA1 -60cm 150cm\nB1 0 1.5m'])
+def test_tables_are_parsed(text):
+    assert parse_marks(text) == MARKS
+
+
+@pytest.mark.parametrize('text,named', [
+    ('A1, -600', 'line 1 is'), ('A1, -600, 1500\nB1, far, 1500', "line 2: 'far' is not a length"),
+    ('A1, 0, 0', 'line 1: Z is 0 mm; at least 50 mm'),
+    (', 0, 1500', 'line 1: the name is empty'), ('A1, 0, 1500\na1, 0, 2000', 'a1 is not unique'),
+    ('Name, X [m], Z [m]\nA1, -0.6, 1.5', 'line 2: Z is 1.5 mm; at least 50 mm')])
+def test_invalid_tables_are_rejected(text, named):
+    with pytest.raises(ValueError, match=named):
+        parse_marks(text)
+
+
+@pytest.mark.parametrize('text,expected_m', [
+    ('1230', 1.23), ('1.23m', 1.23), ('1,23 m', 1.23), ('1,2305', 0.001231), ('\u2212650', -0.65), (' 12 cm ', 0.12),
+    ('.5m', 0.5), ('1,230 m', 1.23), ('1.230', 0.00123), ('-0', 0.0), ('100000', 100.0)])
+def test_lengths_are_parsed(text, expected_m):
+    assert parse_length(text) == pytest.approx(expected_m, abs=5e-7)
+    assert str(parse_length(text)) != '-0.0'
+
+
+@pytest.mark.parametrize('text,named', [
+    ('1,230', '1230 mm .*1.230 mm'), ('100.1m', '100 m')]
+    + [(text, re.escape(repr(text))) for text in ('', 'm', '1 2', '1.2.3', '1e3', 'nan', '1 km', '\u0661', '1_0')])
+def test_invalid_and_ambiguous_lengths_are_rejected(text, named):
+    with pytest.raises(ValueError, match=named):
+        parse_length(text)
+
+
+def test_a_row_contains_box_estimates_and_truth_in_all_axes(document, tmp_path):
+    document.set_truths([0], -0.5, 2.1004, 0.01)
+    path = str(tmp_path / 'table.csv')
+    assert export(document, path, 'foreground') == 1
+    with open(path, newline='') as stream:
+        row, = csv.DictReader(stream)
+    x_m, y_m, z_m = document.estimates.of(0)[0]
+    assert (row['id'], row['label'], row['stamp']) == ('m0', 'by the door', '1616161616.000000005')
+    assert [int(row[edge]) for edge in ('x1', 'y1', 'x2', 'y2')] == list(NEAR_BOX) and row['implausible'] == ''
+    assert [float(row[axis + ' measured']) for axis in 'XYZ'] == pytest.approx(
+        [1000 * x_m, 1000 * y_m, 1000 * z_m], abs=0.06)
+    assert [float(row[axis + ' recorded']) for axis in 'XYZ'] == [-466.5, 33, 2000]
+    assert [float(row[axis + ' true']) for axis in 'XYZ'] == [-500, 10, 2100.4]
+    assert float(row['Z error']) == pytest.approx(1000 * z_m - 2100.4, abs=0.06)
+    assert read_table(path, 'Z').truth_m.tolist() == [[-0.5, 2.1004]]

@@ -1,14 +1,12 @@
 import os
 
-import cv2
 import numpy as np
 import pytest
 
-from ros_3d_bb_annotator import main_window
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.marks import Mark
-from support.small_session import FAR_BOX, NEAR_BOX, change_json, write_measurement, write_small_session
-from support.window import ALT, CONTROL, SHIFT, Qt, QtCore, QtGui, QtWidgets, opened
+from support.small_session import FAR_BOX, NEAR_BOX, change_json, write_small_session
+from support.window import CONTROL, SHIFT, Qt, QtCore, QtGui, QtWidgets, opened
 
 
 def place_in(view, x, y, panel=0):
@@ -26,16 +24,6 @@ def test_the_error_of_a_typed_truth_is_shown_and_enter_saves_it(drive, folder):
     assert opened(folder)[1].truth_m == (-0.5, -0.03, 2.1) and drive.window.current == 2
     drive.press((Qt.Key_Z, CONTROL))
     assert opened(folder)[1].truth_m is None and drive.window.current == 1
-
-
-@pytest.mark.parametrize('x, z, problem, field', [
-    ('12e', '2000', "X: '12e' is not a length", 'x'), ('100', '', 'Z: a length is missing', 'z')])
-def test_invalid_truth_is_reported_next_to_the_fields(drive, x, z, problem, field):
-    drive.press(x, Qt.Key_Tab, z, Qt.Key_Return)
-    truth = drive.window.pane.truth
-    assert problem in truth.hint_label.text() and drive.window.current == 0
-    assert drive.measurement(0).state == 'new' and truth.fields['z'].text() == z
-    assert truth.fields[field].hasFocus()
 
 
 @pytest.mark.parametrize('panel', [0, 1])
@@ -105,25 +93,6 @@ def test_reject_asks_for_a_reason_and_restore_undoes_it(drive, folder):
     assert opened(folder)[0].state == 'new' and drive.window.last_entry.text() == ''
 
 
-def buttons_of(dialog):
-    return {button.text().replace('&', ''): button for button in dialog.findChildren(QtWidgets.QPushButton)}
-
-
-def test_an_implausible_position_is_asked_about_and_enter_corrects_it(drive, folder):
-    def correct(dialog):
-        assert dialog.defaultButton().text() == '&Correct it'
-        dialog.defaultButton().click()
-        return dialog.informativeText()
-    drive.press('-500', Qt.Key_Tab, '2.1')
-    assert 'Implausible' in drive.window.pane.truth.hint_label.text()
-    text = drive.answer(correct, lambda: drive.press(Qt.Key_Return))
-    assert 'Z 2 mm is implausible' in text
-    assert drive.measurement(0).truth_m is None and drive.window.pane.truth.fields['z'].text() == '2.1'
-    drive.answer(lambda dialog: buttons_of(dialog)['Enter it anyway'].click(),
-                 lambda: drive.press(Qt.Key_Return))
-    assert opened(folder)[0].state == 'annotated'
-
-
 def test_boxes_are_deleted(drive, folder):
     drive.press((Qt.Key_D, CONTROL | SHIFT))
     assert [one.box_px for one in opened(folder)[0].detections] == [FAR_BOX]
@@ -146,68 +115,6 @@ def test_truth_and_rejection_are_entered_for_all_selected_measurements(drive, fo
 
 def message_of(box):
     return box.text() + box.informativeText()
-
-
-def test_typed_text_stays_until_entered_or_another_measurement_is_shown(drive):
-    fields = drive.window.pane.truth.fields
-    drive.press('-500', Qt.Key_Tab, '2100', (Qt.Key_2, ALT), (Qt.Key_1, ALT))
-    assert [fields[name].text() for name in 'xz'] == ['-500', '2100']
-    drive.press(Qt.Key_F4, Qt.Key_Return, Qt.Key_PageUp)
-    assert drive.measurement(0).truth_m == (-0.5, None, 2.1)
-    drive.press('12', Qt.Key_PageDown)
-    assert fields['x'].text() == ''
-    drive.press(Qt.Key_PageUp)
-    assert fields['x'].text() == '-500'
-
-
-@pytest.fixture
-def fast_refresh(monkeypatch):
-    monkeypatch.setattr(main_window, 'REFRESH_MS', 20)
-
-
-def test_changes_by_other_programs_are_shown(fast_refresh, window_on, folder):
-    drive = window_on(folder)
-    drive.press('12')
-    entry = write_measurement(folder, 'm4')
-    change_json(folder, lambda content: content['frames'].append(entry))
-    drive.wait_for(lambda: drive.window.list.model().rowCount() == 5)
-    assert drive.window.pane.truth.fields['x'].text() == '12' and drive.window.current == 0
-    assert drive.window.progress.text() == '0 of 5 done'
-    drive.window.show_measurement(4)
-    drive.press('34')
-    change_json(folder, lambda content: content['frames'].pop())
-    drive.wait_for(lambda: drive.window.list.model().rowCount() == 4)
-    assert drive.window.current == 0 and drive.window.pane.truth.fields['x'].text() == ''
-
-
-def test_a_measurement_after_a_deleted_one_is_shown_with_its_image(fast_refresh, window_on, folder):
-    drive = window_on(folder)
-    drive.window.show_measurement(3)
-    before_m = drive.document.estimates.of(3)[0][2]
-    entry = write_measurement(folder, 'm4')  # as d and s in the viewer
-    path = os.path.join(folder, entry['depth'])
-    cv2.imwrite(path, cv2.imread(path, cv2.IMREAD_UNCHANGED) - np.uint16(500))
-    change_json(folder, lambda content: content['frames'].__setitem__(3, entry))
-    drive.wait_for(lambda: drive.measurement(3).id == 'm4')
-    assert drive.document.estimates.of(3)[0][2] == pytest.approx(before_m - 0.5, abs=0.02)
-    shown = drive.window.pane.images.panels[1].image
-    drive.window.show_measurement(2)
-    assert drive.window.pane.images.panels[1].image != shown
-
-
-def test_numbers_and_errors_of_measurements_are_visible_in_a_small_window(window_on, folder):
-    """The IDs are those of the viewer: their numbers differ, and the stamps behind them begin and end alike."""
-    change_json(folder, lambda content: [entry.update(id='%05d_1616161616_%09d' % (number, 500000000 + number))
-                                         for number, entry in enumerate(content['frames'])])
-    drive = window_on(folder)
-    drive.window.resize(800, 600)
-    drive.settle()
-    table = drive.window.list
-    shown = [table.model().headerData(column, Qt.Horizontal) for column in range(table.model().columnCount())
-             if table.columnViewportPosition(column) + table.columnWidth(column) <= table.viewport().width()]
-    assert {'ID', 'X', 'Z', 'Error'} <= set(shown)
-    assert [table.model().index(row, 0).data() for row in range(4)] == ['00000', '00001', '00002', '00003']
-    assert table.fontMetrics().boundingRect('00000').width() < table.columnWidth(0)
 
 
 def test_an_invalid_session_gives_a_message(window_on, tmp_path):

@@ -1,9 +1,11 @@
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 from hypothesis.extra import numpy as hnp
 
-from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, quaternion_from, transform_from, transform_points
+from ros_3d_bb.camera.camera_model import Camera, quaternion_from, transform_from
+from ros_3d_bb.camera.distortion import EQUIDISTANT, INVERSE_BROWN_CONRADY, PLUMB_BOB, RATIONAL_POLYNOMIAL
 from ros_3d_bb.camera.images import (mounted_camera, quarter_turns, turned_boxes, turned_camera, turned_image,
                                      turned_rotation, turns_for)
 
@@ -30,12 +32,6 @@ def test_quaternion_from_is_the_inverse_of_transform_from(quaternion):
     expected = np.array(quaternion) / np.linalg.norm(quaternion)
     assert found[3] >= 0
     np.testing.assert_allclose(found * np.sign(found.dot(expected)), expected, atol=1e-9)
-
-
-def test_optical_frame_of_a_camera_that_points_ahead():
-    """REP 103: in the body frame x is forward, y left, z up; the optical z is forward, x right, y down."""
-    body_from_optical = transform_from((0.17, 0, 0.2), OPTICAL_ROTATION)
-    np.testing.assert_allclose(transform_points(body_from_optical, [(1, 2, 3)]), [(3.17, -1, -1.8)], atol=1e-12)
 
 
 @pytest.mark.parametrize('quaternion', [(0, 0, 0, 0), (float('nan'), 0, 0, 1), (float('inf'), 0, 0, 0)])
@@ -86,6 +82,96 @@ def test_turns_of_a_mounted_camera_and_a_positive_tilt_looks_down(turns, tilt_ra
     np.testing.assert_allclose(turned_rotation(turns).dot(up), mounted_camera(1.2, tilt_rad, 0)[2, :3], atol=1e-12)
 
 
-@pytest.mark.parametrize('image_rotation, turns', [('0', 0), ('90', 1), ('180', 2), ('270', 3), ('auto', 0)])
-def test_a_given_rotation_is_used_and_an_unknown_one_is_none(image_rotation, turns):
-    assert turns_for(image_rotation, None) == turns
+# Horizontal field of view in degrees, where the camera has 640 x 480, and the lens. The first is a D435's colour
+# camera, the second a D455's, then a wide-angle lens, an Azure Kinect's, and T265's fisheye cut to 120 degrees.
+LENSES = [(55, PLUMB_BOB, (0.16, -0.5, -0.001, 0.0006, 0.47)),
+          (79, PLUMB_BOB, (-0.055, 0.065, -0.0003, 0.0009, -0.021)),
+          (94, RATIONAL_POLYNOMIAL, (8.5, 5.2, 1e-4, -5e-5, 0.21, 8.9, 8.0, 1.35)),
+          (56, RATIONAL_POLYNOMIAL, (0.52, -2.73, 7.4e-4, -8e-5, 1.57, 0.40, -2.55, 1.50)),
+          (55, INVERSE_BROWN_CONRADY, (0.16, -0.5, -0.001, 0.0006, 0.47)),
+          (120, EQUIDISTANT, (-0.0022, 0.0376, -0.0364, 0.0059)), (120, EQUIDISTANT, (0, 0, 0, 0))]
+SIZES = [(640, 480), (1280, 720)]
+
+
+def camera_of(lens, size):
+    fov_deg, model, coefficients = lens
+    half = np.radians(fov_deg / 2)
+    focal = size[0] / 2 / (half if model == EQUIDISTANT else np.tan(half))
+    return Camera(size[0], size[1], focal, 1.001 * focal, size[0] / 2 - 0.8, size[1] / 2 + 2.1, model, coefficients)
+
+
+CAMERAS = [camera_of(lens, size) for size in SIZES for lens in LENSES]
+FOR_OPENCV = [camera for camera in CAMERAS if camera.distortion_model != INVERSE_BROWN_CONRADY]
+
+
+def named(camera):
+    return '%s-%d' % (camera.distortion_model, camera.width)
+
+
+def every_pixel(camera, step):
+    """(n, 2), including the corners."""
+    u, v = np.meshgrid(*(np.unique(np.append(np.arange(0, size, step), size - 1)) for size in camera[:2]))
+    return np.stack((u, v), axis=-1).reshape(-1, 2).astype(float)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('camera', FOR_OPENCV, ids=named)
+def test_equals_opencv(camera):
+    """Rays to 1e-6 pixels where OpenCV iterates until convergence, and pixels by its own projection."""
+    pixels = every_pixel(camera, 7)
+    matrix = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]])
+    points, lens = camera.deproject(pixels, 1.0), np.array(camera.distortion)
+    assert np.abs(camera.project(points) - pixels).max() < 1e-6
+    if camera.distortion_model == EQUIDISTANT:
+        rays = cv2.fisheye.undistortPoints(pixels[:, None], matrix, lens)
+        back = cv2.fisheye.distortPoints(points[:, None, :2], matrix, lens)
+    else:
+        until = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, 1e-14)
+        rays = cv2.undistortPointsIter(pixels[:, None], matrix, lens, None, None, until)
+        back, _jacobian = cv2.projectPoints(points[:, None], np.zeros(3), np.zeros(3), matrix, lens)
+    assert np.abs((rays[:, 0] - points[:, :2]) * camera[2:4]).max() < 1e-6
+    assert np.abs(back[:, 0] - pixels).max() < 1e-6
+
+
+@pytest.mark.parametrize('camera', CAMERAS, ids=named)
+def test_opencv_before_3_3_1_gives_the_same_rays(camera, monkeypatch):
+    """Ubuntu 18.04 has OpenCV 3.2; undistortPointsIter came with 3.3.1."""
+    pixels = every_pixel(camera, 29)
+    expected = camera.undistort(pixels)
+    monkeypatch.delattr(cv2, 'undistortPointsIter')
+    np.testing.assert_allclose(camera.undistort(pixels), expected, rtol=1e-9, atol=1e-6)
+
+
+@pytest.mark.parametrize('camera', CAMERAS[:len(LENSES)], ids=named)
+@pytest.mark.parametrize('offset_px', [0, 1e-9, 1e-6, 3e-6, 1e-5, 1e-4])
+def test_pixels_next_to_the_axis_have_a_ray(camera, offset_px):
+    pixel = np.array((camera.cx + offset_px, camera.cy - offset_px))
+    np.testing.assert_allclose(camera.project(camera.deproject(pixel, 1.0)), pixel, rtol=0, atol=1e-9)
+    assert camera.deproject(np.zeros((0, 2)), np.zeros(0)).shape == camera.project(np.zeros((0, 3))).shape[:1] + (3,)
+
+
+def test_there_are_no_rays_and_images_beyond_a_fold_of_the_polynomial():
+    """r - 0.4 r^3 grows up to r = 0.913, where it is 0.609."""
+    camera = Camera(640, 480, 500, 500, 320, 240, PLUMB_BOB, (-0.4, 0, 0, 0, 0))
+    pixels = np.array([(320 + 500 * 0.6, 240), (320 + 500 * 0.62, 240)])
+    points = camera.deproject(pixels, 2.0)
+    assert 1.6 < points[0, 0] < 2 * 0.913 and np.isnan(points[1, :2]).all() and points[1, 2] == 2.0
+    assert np.isfinite(camera.project((0.9, 0, 1))).all() and np.isnan(camera.project((0.93, 0, 1))).all()
+
+
+@pytest.mark.parametrize('model,given,kept', [
+    ('', (), ()), ('none', (0,) * 5, ()), (RATIONAL_POLYNOMIAL, (0,) * 5, ()), (EQUIDISTANT, (0,) * 5, (0,) * 4),
+    (PLUMB_BOB, (0.1, 0, 0, 0), (0.1, 0, 0, 0, 0)), (PLUMB_BOB, (0.1, 0, 0, 0, 0.2, 0), (0.1, 0, 0, 0, 0.2))])
+def test_missing_and_appended_zeros_are_normalised(model, given, kept):
+    camera = Camera(640, 480, 600, 600, 320, 240, model, given)
+    assert camera.distortion == kept and camera.distortion_model == (model if kept else '')
+
+
+@pytest.mark.parametrize('model,coefficients,reason', [
+    ('thin_prism', (0.1,) * 5, "'thin_prism'; one of equidistant, inverse_brown_conrady, plumb_bob, rational"),
+    (PLUMB_BOB, (0.1,) * 3, r'plumb_bob has 3 .*; 5 expected \(k1, k2, p1, p2, k3\)'),
+    (EQUIDISTANT, (0.1,) * 5, '4 expected'), (INVERSE_BROWN_CONRADY, (0.1,) * 4, '5 expected'),
+    (PLUMB_BOB, (float('nan'), 0, 0, 0, 0), 'finite'), (PLUMB_BOB, (1e9, 0, 0, 0, 0), 'below 1e')])
+def test_unusable_distortion_is_rejected(model, coefficients, reason):
+    with pytest.raises(ValueError, match=reason):
+        Camera(640, 480, 600, 600, 320, 240, model, coefficients)

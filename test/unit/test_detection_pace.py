@@ -67,13 +67,6 @@ def test_size_and_rate_increase_again_after_each_load():
         assert detected(pace, by_pixels(0.018), 40, start_s=start_s + 20)[-1][2:] == (640, 1)
 
 
-def test_the_rate_does_not_depend_on_a_load_before():
-    """The smallest size takes 0.85 periods, which is fast enough."""
-    pace = DetectionPace((384,))
-    assert detected(pace, lambda *_state: 0.09, 5)[-1][3] == 3
-    assert detected(pace, lambda *_state: 0.85 / 30, 10, start_s=5)[-1][3] == 1
-
-
 @pytest.mark.parametrize('duration_of', [
     lambda size, _interval, _time_s: {640: 0.034, 576: 0.015}.get(size, 0.01),  # more than proportional to the pixels
     lambda _size, interval, _time_s: 0.035 if interval == 1 else 0.025])  # a rate that slows down other programs
@@ -105,12 +98,3 @@ def test_people_in_range_are_high_enough_in_the_smallest_input():
     assert sizes_for_range(6, 614.7, 640) == SIZES
     assert sizes_for_range(8, 922, 1280) == (512, 576, 640)
     assert sizes_for_range(8, 300, 640) == (640,)
-
-
-def test_other_sizes_keep_the_current_one_if_it_is_among_them():
-    pace = DetectionPace(SIZES)
-    assert detected(pace, by_pixels(0.045), 10)[-1][2] == 448
-    pace.use_sizes((448, 512, 576, 640))
-    assert pace.size == 448
-    pace.use_sizes((960,))
-    assert (pace.size, pace.interval) == (960, 1)

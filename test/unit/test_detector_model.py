@@ -1,5 +1,4 @@
 import sys
-import tracemalloc
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,7 +11,6 @@ from ros_3d_bb.tracking.measurement_model import DEFAULT_RANGE_M, learned_range
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb_lab.evaluation.noise import __main__ as command
-from ros_3d_bb_lab.evaluation.noise.recordings import lasting_errors
 from ros_3d_bb_lab.evaluation.tracking.recorded_detections import RecordedRun
 from ros_3d_bb_lab.evaluation.tracking.run_generator import Image, RunTruth
 from support.people import VIEW, at, play
@@ -55,17 +53,6 @@ def test_the_command_measures_errors_detections_and_range_of_a_recording(run, tm
     sigma_m = np.hypot(LASTING_M, INDEPENDENT_M)
     assert sigma_m < model.z_sigma.at(8.0) < 2 * sigma_m and abs(model.z_bias[-1]) < 0.05  # widened for few people
     assert model.provenance.positions == 12
-
-
-def test_long_recordings_fit_into_memory():
-    person, stamp_ns = np.tile(np.arange(3), 2000), np.repeat(np.arange(2000) * NS // 30, 3)
-    errors_m = np.repeat(0.1 * np.random.RandomState(0).normal(size=(200, 2)), 30, axis=0)
-    tracemalloc.start()
-    lasting_m, time_s = lasting_errors(errors_m, person, stamp_ns)
-    _size, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert peak < 1e8  # it grew with the square of the number of errors, to 10 times as much here
-    assert lasting_m == pytest.approx(0.1, abs=0.03) and 0.05 < time_s < 1
 
 
 def test_the_range_is_learned_from_people_farther_away():

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.planning.following import Follower, FollowParams, TargetSelector, is_new_goal
+from ros_3d_bb.planning.following import Follower, FollowParams, TargetSelector
 from ros_3d_bb.planning.safe_speed import SafeSpeedParams
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
 from ros_3d_bb_lab.simulation.driven_world import moved
@@ -224,8 +224,3 @@ def test_goals_keep_the_distance_and_look_at_the_person():
     assert follower.goal(0.0, np.eye(4)) == pytest.approx((3.0 * np.cos(yaw), 3.0 * np.sin(yaw), yaw))
     follower.update([person(1, 0.6, 0)], 2 * NS, np.eye(4))
     assert follower.goal(0.0, np.eye(4)) == pytest.approx((0, 0, 0))
-
-
-def test_goals_are_sent_again_when_they_have_changed():
-    assert is_new_goal(None, (1, 2, 3)) and is_new_goal((1, 2, 3), (1.3, 2, 3)) and is_new_goal((1, 2, 3), (1, 2, 3.4))
-    assert not is_new_goal((1, 2, np.pi), (1.1, 2, -np.pi + 0.1))

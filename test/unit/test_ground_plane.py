@@ -2,12 +2,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from ros_3d_bb.camera.camera_model import Camera, transform_points
+from ros_3d_bb.camera.camera_model import Camera
 from ros_3d_bb.camera.images import DepthImage
-from ros_3d_bb.detection.depth.ground_plane import (MAX_HIGHER, FittedFloor, Floor, KnownFloor, fit_floor,
-                                                    floor_from_transform)
+from ros_3d_bb.detection.depth.ground_plane import MAX_HIGHER, FittedFloor, Floor, KnownFloor, fit_floor
 from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
-from support.people import mounted
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 V, U = np.mgrid[:CAMERA.height, :CAMERA.width]
@@ -90,14 +88,3 @@ def test_the_result_is_none_without_a_floor():
     for depth_m in (np.zeros(U.shape), np.full(U.shape, np.nan), np.full(U.shape, 2.0), 1 + U / 300.0,
                     depth_of(floor_of(0.2, 0, 3.5))):
         assert fit_floor(DepthImage(depth_m, 1.0), CAMERA) is None
-
-
-@given(st.floats(-20, 20), st.floats(-20, 20), st.floats(0.2, 2))
-def test_heights_agree_with_the_transform(pitch_deg, yaw_deg, height_m):
-    camera_from_base = np.linalg.inv(mounted(height_m, pitch_deg, yaw_deg=yaw_deg))
-    floor = floor_from_transform(camera_from_base)
-    points = np.array([[2, 1, 0], [3, -1, 1.7], [1, 0, -0.4]])
-    np.testing.assert_allclose(floor.height(transform_points(camera_from_base, points)), points[:, 2], atol=1e-9)
-    assert abs(floor.offset_m - height_m) < 1e-9
-    row = floor.row(CAMERA, 100.0, 2.5)
-    assert abs(floor.height(CAMERA.deproject([100.0, row], 2.5))) < 1e-9

@@ -1,10 +1,8 @@
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 from hypothesis import given, strategies as st
 
-from ros_3d_bb.tracking.association import position_costs
 from ros_3d_bb.tracking.kalman_filter import outlier_model, predict, update
 from ros_3d_bb.tracking.tracker import TrackerParams
 from support.states import covariance_of, mean_of, state_of
@@ -50,11 +48,3 @@ def test_the_mixture_has_the_mean_and_the_covariance_of_both_updates(seed):
     after = update(state_of(mean, covariance), measured_at(*place_m, ray=ray), OUTLIERS)
     np.testing.assert_allclose(mean_of(after), mixed, rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(covariance_of(after), np.average(spreads, axis=0, weights=shares), rtol=1e-6, atol=1e-8)
-
-
-def test_the_cost_of_a_position_is_that_of_a_density():
-    """p, summed over a fine grid of places, is a probability of 1."""
-    step_m = 0.05
-    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(-3, 4, step_m), np.arange(-3, 3, step_m)))
-    costs = position_costs(x, y, 0.05, 0.0, 0.05, 1.0, 0.0, OUTLIERS)
-    assert np.exp(-costs).sum() * step_m ** 2 == pytest.approx(1, abs=0.01)

@@ -55,14 +55,6 @@ def test_invalid_tables_are_rejected(content, reason):
         object_classes_from(content)
 
 
-@pytest.mark.parametrize('heading_deg', [0, 20, 45, 70, 90])
-def test_the_axis_of_an_ellipse_is_half_of_its_extent_behind(heading_deg):
-    dog, (sin, cos) = CLASSES['dog'], (np.sin(np.radians(heading_deg)), np.cos(np.radians(heading_deg)))
-    across_m, along_m = (np.hypot(dog.length * one, dog.width * other) for one, other in ((sin, cos), (cos, sin)))
-    assert dog.axis_behind(across_m) == pytest.approx(along_m / 2)
-    assert dog.axis_behind(5.0) == pytest.approx(dog.width / 2)
-
-
 @pytest.mark.parametrize('label, behind_m', [('chair', 0.18), ('dog', None), ('drone', 0.25), ('person', 0.09)])
 def test_a_box_has_the_distance_of_its_class(label, behind_m):
     depth_mm = np.full((480, 640), 5000, np.uint16)

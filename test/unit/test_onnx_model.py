@@ -1,5 +1,4 @@
 import os
-from collections import namedtuple
 
 import numpy as np
 import pytest
@@ -7,10 +6,8 @@ import pytest
 from ros_3d_bb.core.object_classes import COCO
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetector
-from ros_3d_bb.detection.onnx.heads import P6
 from ros_3d_bb.detection.onnx.onnx_model import OnnxModel
 from ros_3d_bb.detection.weights import WeightsError
-from ros_3d_bb.detection.yolov5.backends import open_detector
 from ros_3d_bb.detection.yolov5.onnx_writer import Graph
 from ros_3d_bb.sessions.session_reader import read_color, read_session
 from support.onnx_files import FLOAT, FLOAT16, UINT8, outputs_of, write_constant_network, write_mean_network
@@ -23,46 +20,13 @@ ALL = DetectionParams(classes=list(range(3)))
 TIE = 2e-5  # scores that differ by less are in another order after other rounding
 pytestmark = pytest.mark.needs('onnxruntime')
 
-# A network, images, and the detections (n, 6) that ultralytics found in them.
-Reference = namedtuple('Reference', 'path images detections')
 
-
-@pytest.fixture(scope='module', params=['yolov8n', 'yolo11n', 'yolo26n', 'yolov8n-seg'])
-def family(request):
-    return request.param
-
-
-@pytest.fixture(params=['480x640', 'dynamic'])
-def reference(request, family, session_folder, tmp_path):
-    """Exports and detections of ultralytics; without data, random boxes and the rule of its suppression."""
-    if not DATA:
-        return made_reference(tmp_path / 'made.onnx', request.param)
-    folder = os.path.join(DATA, 'weights', 'exports')
+def references(folder, family, session_folder):
+    """Images, and the detections (n, 6) that ultralytics found in them with a network of this family."""
     session = read_session(session_folder)
     with np.load(os.path.join(folder, family + '_reference.npz')) as recorded:
-        numbers = [int(name[6:]) for name in recorded.files if name[6:].isdigit()]
-        detections = [recorded['frame_%d' % number] for number in numbers]
-    images = [read_color(session.frames[number], session.camera) for number in numbers]
-    return Reference(os.path.join(folder, '%s-%s.onnx' % (family, request.param)), images, detections)
-
-
-def made_reference(path, _kind):
-    random = np.random.RandomState(0)
-    corners = np.hstack((random.uniform(0, 500, (6300, 2)), np.zeros((6300, 2))))
-    corners[:, 2:] = corners[:, :2] + random.uniform(20, 140, (6300, 2))
-    scores = random.uniform(0, 1, (6300, 80)) ** 40
-    center, size = (corners[:, :2] + corners[:, 2:]) / 2, corners[:, 2:] - corners[:, :2]
-    write_constant_network(path, [np.hstack((center, size, scores)).T[None]], (1, 3, 480, 640))
-    best = scores.argmax(axis=1)
-    kept = []
-    for number in np.argsort(-scores.max(axis=1)):
-        rivals = [other for other in kept if best[other] == best[number]]
-        if scores[number].max() > 0.25 and len(kept) < 100 and not (
-                rivals and iou(corners[number], corners[rivals]).max() > 0.45):
-            kept.append(number)
-    expected = np.hstack((corners[kept], scores[kept].max(axis=1)[:, None], best[kept][:, None]))
-    return Reference(str(path), [np.zeros((480, 640, 3), np.uint8)],
-                     [np.hstack((np.clip(expected[:, :4], 0, [640, 480, 640, 480]), expected[:, 4:]))])
+        for number in [int(name[6:]) for name in recorded.files if name[6:].isdigit()]:
+            yield read_color(session.frames[number], session.camera), recorded['frame_%d' % number]
 
 
 class TiesAs(OnnxModel):
@@ -107,13 +71,17 @@ def assert_same_detections(detections, expected):
         assert difference.min() <= 0.5 and abs(expected[nearest, 4] - score) <= 1e-3
 
 
-@pytest.mark.needs('onnxruntime.tools.offline_tuning')  # ONNX Runtime 1.14 supports opset 18
-def test_detections_are_those_of_ultralytics(reference):
-    network = TiesAs(reference.path, 1)
-    detector = NetworkDetector(network, DetectionParams(classes=list(range(80))))
-    for image, network.expected in zip(reference.images, reference.detections):
-        assert_same_detections(detector.detect(image), network.expected)
-    assert network.names == list(COCO) and not network.suppressed
+if DATA:  # test_network_detector.py tests the decoders without recorded data
+    @pytest.mark.needs('onnxruntime.tools.offline_tuning')  # ONNX Runtime 1.14 supports opset 18
+    @pytest.mark.parametrize('size', ['480x640', 'dynamic'])
+    @pytest.mark.parametrize('family', ['yolov8n', 'yolo11n', 'yolo26n', 'yolov8n-seg'])
+    def test_detections_are_those_of_ultralytics(session_folder, family, size):
+        folder = os.path.join(DATA, 'weights', 'exports')
+        network = TiesAs(os.path.join(folder, '%s-%s.onnx' % (family, size)), 1)
+        detector = NetworkDetector(network, DetectionParams(classes=list(range(80))))
+        for image, network.expected in references(folder, family, session_folder):
+            assert_same_detections(detector.detect(image), network.expected)
+        assert network.names == list(COCO) and not network.suppressed
 
 
 @pytest.mark.slow
@@ -143,15 +111,6 @@ def test_a_class_that_the_network_does_not_have_is_named(tmp_path, names, reason
 
 
 COLOR = (3, 200, 5)
-
-
-@pytest.mark.parametrize('head', ['yolov8', 'yolox'])
-def test_outputs_without_a_batch_axis(tmp_path, head):
-    outputs = outputs_of(head, BOXES, SCORES, HW)
-    network = OnnxModel(write_constant_network(tmp_path / 'a.onnx', [output[0] for output in outputs]), 1)
-    assert network.description.endswith('head: ' + head)
-    found = network.candidates(np.zeros(HW + (3,), np.uint8), 0.25)
-    np.testing.assert_allclose(found.boxes[np.argsort(-found.scores)], BOXES, atol=1e-3)
 
 
 @pytest.mark.parametrize('shape, channels_last', [
@@ -208,22 +167,6 @@ def test_scores_that_are_none_are_rejected(tmp_path, monkeypatch):
     monkeypatch.setattr(network, '_run', lambda _image: [np.array([[(0, 0.9, 100, 50, 200, 300)]])])  # class first
     with pytest.raises(ValueError, match='scores.*200.*end-to-end'):
         network.candidates(np.zeros(HW + (3,), np.uint8), 0.25)
-
-
-def test_sizes_are_multiples_of_the_largest_stride(tmp_path):
-    outputs = outputs_of('yolov5', BOXES, SCORES, (192, 256), P6)  # for the size of the grey image
-    path = write_constant_network(tmp_path / 'a.onnx', outputs, (1, 3, 'h', 'w'))
-    assert OnnxModel(path, 1).stride == 64
-
-
-def test_a_size_that_the_network_cannot_process_is_named(tmp_path):
-    graph = Graph()
-    rows = graph.node('Reshape', ['images', graph.constant(np.array([1, 3 * 192 * 256 // 6, 6], np.int64))])
-    path = tmp_path / 'a.onnx'
-    path.write_bytes(graph.model([('images', FLOAT, (1, 3, 'h', 'w'))], [(rows, FLOAT, (1, 'n', 6))],
-                                 {'end2end': 'True'}))
-    with pytest.raises(ValueError, match='640 x 480'):
-        open_detector(str(path))
 
 
 @pytest.mark.needs('onnx')

@@ -3,12 +3,11 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from ros_3d_bb.camera.camera_model import transform_from
+from ros_3d_bb.planning.cost_grid import CELL_M, COMFORT_M, HALF_SIZE_M, HIGHEST, presence_costs
 from ros_3d_bb.planning.people_removal import are_inside, cylinders_of, scan_parts
 from ros_3d_bb.planning.planner_view import (covariances_after, footprint_points, in_frame, position_after,
                                              predicted_to, usable_tracks, with_usable_covariances)
-from ros_3d_bb.tracking.types import OUT_OF_VIEW
-from ros_3d_bb_lab.simulation.simulator import upright
-from support.tracks import track_at
+from support.tracks import STEP_S, track_at
 
 
 @given(st.floats(-np.pi, np.pi), st.floats(-5, 5), st.floats(-5, 5))
@@ -100,28 +99,6 @@ def segment_distances(points, start, end):
     return np.linalg.norm(points - start - share[:, None] * along, axis=1)
 
 
-def test_positions_become_less_certain_beyond_the_predictions():
-    track = track_at([3, 1, 0.9], [0, 0, 0], covariance=0.01 * np.eye(6))
-    track = track._replace(prediction_covariance_m2=(0.01 + 0.02 * np.arange(1, 9))[:, None, None] * np.eye(3))
-    np.testing.assert_allclose(covariances_after(track, np.array([-0.1, 2.0, 3.0]))[:, 0, 0], [0.01, 0.17, 0.37])
-
-
-def test_without_predictions_positions_become_less_certain_by_the_velocity():
-    track = track_at([3, 1, 0.9], [0, 0, 0], np.empty((0, 3)), covariance=np.diag([0.01, 0.01, 0, 0.04, 0.09, 0]))
-    found_m2 = covariances_after(track._replace(prediction_covariance_m2=np.empty((0, 3, 3))), [0.0, 2.0])
-    np.testing.assert_allclose(found_m2, [np.diag([0.01, 0.01, 0]), np.diag([0.17, 0.37, 0])])
-
-
-@pytest.mark.parametrize('heading', [0.0, np.pi / 4, np.pi / 2])
-def test_marks_of_a_person_out_of_view_do_not_depend_on_the_heading(heading):
-    turn = upright(0, 0, 0, heading)[:3, :3]
-    covariance = np.zeros((6, 6))
-    covariance[:3, :3] = turn.dot(np.diag([0.23 ** 2, 0.1 ** 2, 0.01])).dot(turn.T)
-    track = track_at([3, 1, 0.9], turn.dot([1, 0, 0]), moving=True, covariance=covariance)
-    track = track._replace(status=OUT_OF_VIEW, prediction_covariance_m2=np.tile(covariance[:3, :3], (8, 1, 1)))
-    assert len(footprint_points([track], 0.3, 0.1)) == 0
-
-
 @given(random_tracks(), st.floats(0, 2))
 @settings(deadline=None, max_examples=50)
 def test_footprints_are_on_the_way_and_within_the_body(track, ahead_s):
@@ -169,3 +146,43 @@ def test_a_scan_is_divided_into_parts_of_nearly_the_same_time(count, increment_s
 @pytest.mark.parametrize('count, increment_s', [(0, 0.01), (5, 0.0), (5, -0.1), (5, np.nan), (5, np.inf), (500, 0.1)])
 def test_a_scan_without_plausible_times_is_one_part(count, increment_s):
     assert scan_parts(count, increment_s) == [(slice(None), 0.0)]
+
+
+WIDTH_M = 0.5
+RADIUS_M = WIDTH_M / 2 + COMFORT_M
+ROBOT_RADIUS_M = 0.35
+
+
+def walking(position_m, velocity_mps, stds_m=(0.0, 0.0)):
+    """A track whose standard deviation grows linearly from now to the end of the prediction of 2 s."""
+    covariances_m2 = np.interp(STEP_S * np.arange(9), (0, 2), stds_m)[:, np.newaxis, np.newaxis] ** 2 * np.eye(3)
+    covariance = np.zeros((6, 6))
+    covariance[:3, :3] = covariances_m2[0]
+    return track_at(position_m + (0.85,), velocity_mps + (0.0,), covariance=covariance)._replace(
+        prediction_covariance_m2=covariances_m2[1:])
+
+
+def cost_at(costs, x_m, y_m):
+    row, column = (int((part + HALF_SIZE_M) // CELL_M) for part in (y_m, x_m))
+    return costs[row, column]
+
+
+def test_certain_predictions_cost_most_along_the_way_and_nothing_beside():
+    costs = presence_costs([walking((1.0, -2.0), (0.0, 1.5))], np.eye(4), ROBOT_RADIUS_M)
+    assert costs.dtype == np.int8 and costs.shape == (100, 100)
+    for y_m in np.arange(-1.95, 1.0, 0.1):
+        assert cost_at(costs, 1.0, y_m) == HIGHEST
+        assert cost_at(costs, 1.0 + 2 * RADIUS_M, y_m) == cost_at(costs, 1.0 - 2 * RADIUS_M, y_m) == 0
+    assert cost_at(costs, 1.0, 1.0 + 2 * RADIUS_M) == cost_at(costs, 1.0, -2.0 - 2 * RADIUS_M) == 0
+
+
+def test_a_robot_in_the_way_pays_only_for_going_further_into_it():
+    """A person comes towards the robot from ahead; the probability decreases to the sides."""
+    tracks = [walking((2.0, 0.3), (-1.0, 0.0), (0.1, 0.5))]
+    costs = presence_costs(tracks, np.eye(4), ROBOT_RADIUS_M)
+    assert cost_at(costs, 0.0, 0.0) == cost_at(costs, 0.0, -1.0) == cost_at(costs, 0.0, 1.0) == 0
+    assert cost_at(costs, 1.0, 0.3) == HIGHEST
+    behind = walking((-0.6, 0.0), (0.8, 0.0), (0.1, 0.5))  # does not hide the costs of the other person
+    assert cost_at(presence_costs(tracks + [behind], np.eye(4), ROBOT_RADIUS_M), 1.0, 0.3) == HIGHEST
+    two_m_beside = presence_costs(tracks, transform_from((0, 2, 0), (0, 0, 0, 1)), ROBOT_RADIUS_M)
+    assert cost_at(two_m_beside, 0.0, 2.0) > HIGHEST / 2 and cost_at(two_m_beside, 1.0, 2.3) == HIGHEST

@@ -5,7 +5,7 @@ import pytest
 
 from ros_3d_bb.camera.alignment import EdgeComparison
 from ros_3d_bb.camera.camera_model import Camera, transform_from
-from ros_3d_bb.camera.images import DepthImage, turned_depth
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.camera.registration import RegisteredDepth, Registration
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb_lab.simulation.scenario import scenario_from
@@ -67,15 +67,6 @@ def test_a_rotated_distorted_depth_camera_sees_the_same_points():
     assert np.abs(part - expected_m)[part > 0].max() < 0.02  # the slope of the wall within a pixel
 
 
-def test_the_area_with_depth_is_turned_with_the_image():
-    """The depth camera sees less than the colour camera: people at the border of the area are truncated."""
-    depth = registered(stripe(), COLOR, 0.02, Camera(160, 120, 160.0, 160.0, 79.5, 59.5))
-    left, top, right, bottom = depth.measured_area()
-    assert 0 < left != 640 - right > 0
-    assert turned_depth(depth, 1).measured_area() == (480 - bottom, left, 480 - top, right)
-    assert turned_depth(depth, 2).measured_area() == (640 - right, 480 - bottom, 640 - left, 480 - top)
-
-
 WALKING = [{'start': [3.0, -1.0], 'moves': [{'to': [3.5, 1.0]}]}]
 APPROACHING = [{'start': [5.0, 0.8], 'moves': [{'to': [2.5, -0.5]}]}, {'start': [4.0, -1.0]}]
 IMAGES = 8
@@ -105,8 +96,7 @@ def with_focal(focal_px):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('people,beside_m,focal_px', [(WALKING, 0.05, 385.0), (APPROACHING, 0.075, 525.0),
-                                                      (APPROACHING, -0.05, 575.0), (WALKING, 0.05, 614.0)])
+@pytest.mark.parametrize('people,beside_m,focal_px', [(WALKING, 0.05, 385.0), (APPROACHING, -0.05, 575.0)])
 def test_depth_from_beside_colour_is_recognised(people, beside_m, focal_px):
     fault = compared(scene(people, beside_m=beside_m, camera=with_focal(focal_px)))
     zoom, = re.findall('enlarged ([0-9.]+) times', fault)
@@ -114,7 +104,7 @@ def test_depth_from_beside_colour_is_recognised(people, beside_m, focal_px):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('people,seed', [([], 0), (WALKING, 0), (APPROACHING, 1)])
+@pytest.mark.parametrize('people,seed', [([], 0), (APPROACHING, 1)])
 def test_aligned_depth_is_not_reported(people, seed):
     assert not compared(scene(people, seed))
 
@@ -123,9 +113,3 @@ def test_recorded_images_are_not_reported(session_folder):
     session = read_session(session_folder)
     images = [(read_color(frame, session.camera), read_depth(frame, session)) for frame in session.frames[::3]]
     assert not compared(images[:IMAGES]) and not compared(images)
-
-
-def test_images_in_which_nothing_moves_and_other_sizes_give_no_answer():
-    color, depth = next(scene(WALKING, beside_m=0.05, camera=with_focal(385.0)))
-    assert not compared([(color, depth)] * IMAGES)
-    assert not compared([(color[::2], depth)])

@@ -43,7 +43,7 @@ def test_the_robot_stops_before_a_standing_person(distance_m):
     assert free_m - 0.11 <= stopping_distance(speed_mps) <= free_m
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=100)
 @given(st.floats(0.8, 6), st.floats(-3, 3), st.floats(-2, 2), st.floats(-2, 2))
 def test_at_a_safe_speed_the_robot_touches_nobody_who_walks_as_predicted(x, y, vx, vy):
     track = track_at([x, y, 0.9], [vx, vy, 0])
@@ -51,18 +51,6 @@ def test_at_a_safe_speed_the_robot_touches_nobody_who_walks_as_predicted(x, y, v
     times_s = np.arange(0, PARAMS.reaction_time + speed_mps / PARAMS.deceleration, 0.01)
     if nearest_m(0, track, times_s) > RADIUS_M:  # people may walk into a robot that stands
         assert nearest_m(speed_mps, track, times_s) > RADIUS_M - PARAMS.people_clearance
-
-
-@settings(deadline=None, max_examples=100)
-@given(st.floats(0, 2 * np.pi), st.floats(1, 4), st.floats(-1, 1), st.floats(-1, 1))
-def test_more_people_and_less_certain_positions_never_allow_more_speed(angle, distance_m, vx, vy):
-    first = track_at(distance_m * np.array([np.cos(angle), np.sin(angle), 0]), [vx, vy, 0],
-                     covariance=np.diag([.02, .05, 0, 0, 0, 0]))
-    first = first._replace(prediction_covariance_m2=np.tile(first.covariance[:3, :3], (8, 1, 1)))
-    alone = speed_among(first)
-    assert speed_among(first, track_at([2, 0.5, 0.9], [0, 0, 0])) <= alone
-    assert speed_among(first, params=PARAMS._replace(position_sigmas=2.0)) <= alone
-    assert speed_among(first, params=PARAMS._replace(deceleration=0.5)) <= alone + 1e-9
 
 
 def test_people_beside_and_behind_the_way_do_not_count():
@@ -80,13 +68,6 @@ def test_a_robot_at_a_person_may_only_leave():
     near = track_at([0.5, 0.1, 0.9], [0, 0, 0], moving=False)
     assert speed_among(near) == 0.0
     assert speed_among(near, velocity=(-0.5, 0.0, 0.0)) == 2.0
-
-
-def test_positions_are_those_of_now_in_the_frame_of_the_robot():
-    walking = track_at([0.0, 4.0, 0.9], [0, -1.0, 0])
-    robot_from_tracks = np.array([[0.0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])  # it looks along y
-    now = speed_among(track_at([3.0, 0.0, 0.9], [-1.0, 0, 0]))
-    assert speed_among(walking, age_s=1.0, robot_from_tracks=robot_from_tracks) == pytest.approx(now)
 
 
 @pytest.mark.parametrize('tilt_deg', [{'pitch_deg': 5}, {'pitch_deg': -5}, {'roll_deg': 5}])
@@ -109,7 +90,6 @@ def test_limited_velocities_stay_on_their_path():
 SAFETY, CORNERS = SafeSpeedParams(), CornerParams()
 STEP, AHEAD = FIELD_OF_VIEW / (BEAMS - 1), (1.0, 0.0, 0.0)
 PILLAR = {'at': [4.0, 1.2], 'size': [0.7, 0.7, 2.2]}
-HALF_BEAM_M = 0.02  # at the distance of the pillar
 
 
 def corners_from(x, furniture=(PILLAR,), people_m=(), changed=None):
@@ -133,14 +113,6 @@ def test_walls_legs_and_narrow_poles_hide_no_people():
     assert not len(corners_from(0.0, furniture=()))
     assert not len(corners_from(0.0, furniture=[dict(PILLAR, size=[LEAST_WIDTH_M - 0.05] * 2 + [2.2])]))
     assert not len(corners_from(0.0, furniture=(), people_m=[(2.0, 0.5), (1.0, -1.0)]))
-
-
-@pytest.mark.parametrize('invalid', [np.nan, -np.inf, 0.0])
-def test_invalid_ranges_are_ignored(invalid):
-    def changed(ranges_m):
-        ranges_m[::7] = invalid
-        return ranges_m
-    assert corners_from(2.0, changed=changed) == pytest.approx(corners_from(2.0), abs=2 * HALF_BEAM_M)
 
 
 def corners_of_a_wall(ranges_m, least_m=0.1, largest_m=10.0):
@@ -206,7 +178,7 @@ def stopped_before(speed_mps, corner_m, people_mps):
     return (np.linalg.norm(robot_m - corner_m, axis=1) - people_mps * times_s > SAFETY.robot_radius).all()
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=100)
 @given(st.floats(0.5, 5), st.floats(-3, 3), st.floats(0.2, 2.5))
 def test_the_robot_stops_before_people_from_the_corner(x, y, people_mps):
     speed_mps = speed_at(0.0, [x, y], CornerParams(emerging_speed=people_mps))

@@ -1,3 +1,4 @@
+import doctest
 import functools
 
 import numpy as np
@@ -5,12 +6,17 @@ import pytest
 
 from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.tracking import tracker as tracker_module
 from ros_3d_bb.tracking.measurement_model import NoiseParams
 from ros_3d_bb.tracking.occlusion import depths_towards
-from ros_3d_bb.tracking.track import PredictionParams
+from ros_3d_bb.tracking.prediction import PredictionParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
 from support.people import CAMERA, START_NS, VIEW, all_ids, at, ids, noisy, play, standing, view_from
+
+
+def test_the_example_in_the_docstring_works():
+    assert doctest.testmod(tracker_module) == (0, 7)
 
 
 @pytest.mark.parametrize('speed_mps', [0, 1.6])

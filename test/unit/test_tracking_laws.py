@@ -8,7 +8,7 @@ from ros_3d_bb.camera.camera_model import transform_from, transform_points
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.measurement_model import NoiseParams
-from ros_3d_bb.tracking.track import PredictionParams
+from ros_3d_bb.tracking.prediction import PredictionParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
 from ros_3d_bb.tracking.types import CameraView
 from support.people import CAMERA, START_NS, VIEW, at, ids, mounted, play

@@ -8,51 +8,10 @@ from unittest import mock
 import pytest
 
 from ros_3d_bb_lab.evaluation.latency.latency_probe_node import LatencyProbeNode
-from ros_3d_bb_lab.evaluation.navigation.benchmark import MODES
 from support.bags import scene_bag
-from support.launching import loaded
 from support.masterless import masterless
 from support.processes import processes_naming
 from support.real_planners import planner_environment
-
-ARGUMENTS = ['scenario:=/some/scene.yaml', 'record:=/some/record.json']
-
-
-@pytest.mark.parametrize('mode', MODES)
-def test_modes_differ_in_what_move_base_knows_of_people(mode):
-    parameters, nodes = loaded('navigation_benchmark.launch', 'mode:=' + mode, *ARGUMENTS)
-    is_tracked = mode in ('ours', 'limited')
-    assert {'bbox3d_node', 'tracker_node'} & set(nodes) == ({'bbox3d_node', 'tracker_node'} if is_tracked else set())
-    assert parameters['/simulator_node/boxes'] == is_tracked
-    layers = [layer['name'] for layer in parameters['/move_base/local_costmap/plugins']]
-    knows_people = mode not in ('laser', 'none')
-    assert layers == ['static_layer'] + (['people_layer', 'prediction_layer'] if knows_people else
-                                         ['obstacle_layer', 'inflation_layer'])
-    assert parameters['/move_base/DWAPlannerROS/sum_scores'] == knows_people
-    waits_for = [name for name in ('tracks', 'scan') if parameters['/navigation_trial_node/' + name]]
-    assert waits_for == {'laser': ['scan'], 'limited': ['tracks', 'scan'], 'none': []}.get(mode, ['tracks'])
-    assert parameters.get('/speed_limit_node/use_scan') == (True if mode == 'limited' else None)
-    assert parameters['/navigation_trial_node/visible'] == (mode == 'visible')
-    assert parameters['/simulator_node/drive'] and parameters['/simulator_node/supervised']
-
-
-def test_a_detector_replaces_the_true_boxes_and_a_trial_runs_with_teb():
-    parameters, nodes = loaded('navigation_benchmark.launch', 'detector:=depth', 'local_planner:=teb', *ARGUMENTS)
-    assert not parameters['/simulator_node/boxes'] and 'detector_node' in nodes
-    assert parameters['/move_base/base_local_planner'] == 'teb_local_planner/TebLocalPlannerROS'
-
-
-@pytest.mark.parametrize('checks', [0, 1, 2])
-def test_a_latency_probe_that_is_shut_down_early_writes_no_record(tmp_path, checks):
-    """Before the first markers, in the time of warming up, and while it measures."""
-    module, answers = 'ros_3d_bb_lab.evaluation.latency.latency_probe_node.', [False] * checks
-    with masterless({'record': str(tmp_path / 'record.json')}), mock.patch('time.sleep'), \
-            mock.patch(module + 'pids_of_nodes', lambda: {'self': os.getpid()}), \
-            mock.patch('rospy.is_shutdown', lambda: answers.pop() if answers else True):
-        node = LatencyProbeNode()
-        node._arrivals['markers'].extend([(0, 0)] * checks)
-        node.measure()
-    assert os.listdir(str(tmp_path)) == [] and not answers
 
 
 @pytest.mark.long
@@ -95,3 +54,16 @@ def test_results_are_written_and_no_process_remains(tmp_path):
     assert case['pipeline']['cpu_percent'] == pytest.approx(
         case['cpu_percent']['bbox3d_node'] + case['cpu_percent']['tracker_node'])
     assert processes_naming(str(tmp_path)) == 0
+
+
+@pytest.mark.parametrize('checks', [0, 1, 2])
+def test_a_latency_probe_that_is_shut_down_early_writes_no_record(tmp_path, checks):
+    """Before the first markers, in the time of warming up, and while it measures."""
+    module, answers = 'ros_3d_bb_lab.evaluation.latency.latency_probe_node.', [False] * checks
+    with masterless({'record': str(tmp_path / 'record.json')}), mock.patch('time.sleep'), \
+            mock.patch(module + 'pids_of_nodes', lambda: {'self': os.getpid()}), \
+            mock.patch('rospy.is_shutdown', lambda: answers.pop() if answers else True):
+        node = LatencyProbeNode()
+        node._arrivals['markers'].extend([(0, 0)] * checks)
+        node.measure()
+    assert os.listdir(str(tmp_path)) == [] and not answers

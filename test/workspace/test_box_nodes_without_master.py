@@ -3,42 +3,33 @@ from unittest import mock
 
 import numpy as np
 import pytest
-from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int32MultiArray
 from std_srvs.srv import SetBoolRequest
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth, imgmsg_to_rgb
-from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_from_msg,
-                                                   boxes3d_to_msg, stamp_of, time_from)
+from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, boxes2d_from_msg, boxes3d_to_msg,
+                                                   stamp_of, time_from)
 from ros_3d_bb.core.detection_pace import WINDOW
-from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb.detection.depth.person_clusters import DepthPeopleParams
-from ros_3d_bb.detection.detector import DetectorParams
 from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.detection.yolov5.backends import RuntimeParams
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.common import detector_output
 from ros_3d_bb.nodes.detector_node import DetectorNode
-from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.nodes.viewer_node import ViewerNode
-from ros_3d_bb.pipeline.estimation_stage import Bbox3dParams
-from ros_3d_bb.pipeline.tracking_stage import TRACKING_PARAMS, TrackerNodeParams
 from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
 from ros_3d_bb.visualization.image_overlay import VALID_COLOR
-from ros_3d_bb.visualization.markers import AREA, MARKERS_TOPIC, MarkerParams
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
-from support.inputs import CAMERA, TARGETS, good_messages, send_image, transforms
+from support.inputs import CAMERA, TARGETS, good_messages, send_image
 from support.launching import loaded
 from support.masterless import masterless
 from support.ros import depth_message, header_at
-from support.two_cameras import boxes
 
 START_NS = 1000 * NS
 
@@ -77,12 +68,6 @@ def test_boxes_without_a_stamp_get_the_image_that_arrived_before_them(connection
     assert message.header.stamp == time_from(stamp_ns) and message.boxes[0].center.position.z == pytest.approx(2.0)
 
 
-def test_a_changed_estimator_is_used_from_the_next_image(connections):
-    connections.node._reconfigure(Bbox3dParams(estimator='foreground'))
-    send_image(connections, START_NS)
-    assert 2.05 < connections.publishers[BOXES3D_TOPIC].newest.boxes[0].center.position.z < 2.15  # the axis
-
-
 def test_debug_images_are_published_while_they_have_subscribers(connections):
     images = {name: connections.publishers['ros_3d_bb/' + name] for name in ('color', 'raw', 'depth')}
     for number in range(3):  # colour is subscribed with the first boxes
@@ -100,13 +85,12 @@ def test_debug_images_are_published_while_they_have_subscribers(connections):
 PEOPLE = [{'start': [4.0, 0.8], 'facing': 3.1, 'height': 1.8}, {'start': [5.0, -0.9], 'facing': 1.6, 'height': 1.7}]
 
 
-def answer(frame_id='camera_color_optical_frame', changed=DepthPeopleParams(), **scenario):
+def answer(frame_id='camera_color_optical_frame', **scenario):
     """The boxes and the annotated image of one image, the counts of the node, and the true boxes."""
     simulator = Simulator(scenario_from(dict({'rate': 10.0, 'people': PEOPLE}, **scenario)))
     frame = simulator.frame(0)
     with masterless({'detector': 'depth'}) as connections:
         node = DetectorNode()
-        node._reconfigure(DetectorParams(), changed)
         for topic, message in simulated_messages(simulator, frame, START_NS):
             topic = '/tf' if topic == 'tf' else topic
             if topic != '/tf':
@@ -127,11 +111,6 @@ def test_people_are_detected_with_stamp_and_frame_of_the_image(frame_id):
     assert all(iou(np.array(box, float), found.boxes.astype(float)).max() > 0.5 for box in true_boxes)
     assert set(found.labels) == {'person'} and (found.scores > 0).all()
     assert ('tilt of the camera unknown' in counts) == (frame_id == 'unknown_to_tf')
-
-
-def test_a_changed_range_applies_from_the_next_image_on():
-    """One of the people is 4 m away and one 5 m."""
-    assert len(boxes2d_from_msg(answer(changed=DepthPeopleParams(max_depth=4.5))[0]).boxes) == 1
 
 
 def test_nothing_is_published_while_no_floor_is_known():
@@ -210,29 +189,6 @@ def test_a_slow_network_gets_smaller_images_as_the_range_permits_and_then_fewer_
     assert node._diagnostics.counts['images skipped for a steady rate'] == WINDOW - WINDOW // 2
 
 
-def test_no_track_starts_in_ignored_areas_nor_behind_cells_of_the_map():
-    """A person 3 m ahead, one in an area at 5 m, and a poster on a wall at 7 m; the wall ends before y = 2."""
-    grid = OccupancyGrid(header=header_at(0, 'map'), data=[100] * 20)
-    grid.info.width, grid.info.height, grid.info.resolution = 1, 20, 0.1
-    grid.info.origin.position.x, grid.info.origin.position.y, grid.info.origin.orientation.w = 7.0, -1.0, 1.0
-    parameters, nodes = loaded('tracker.launch', 'map:=static_map')
-    assert ('map', 'static_map') in [tuple(remapping) for remapping in nodes['tracker_node'].remap_args]
-    with masterless({'use_map': parameters['/tracker_node/use_map'], 'tf_timeout': 0.0}) as connections:
-        node, areas = TrackerNode(), '[[[4.5, -0.5], [5.5, -0.5], [5.5, 0.5], [4.5, 0.5]]]'
-        node._reconfigure(*params_from({'ignored_areas': areas}, TrackerNodeParams, MarkerParams, *TRACKING_PARAMS))
-        connections.send('map', grid)
-        for number in range(10):
-            stamp_ns = START_NS + number * NS // 10
-            connections.send('/tf', transforms(stamp_ns))
-            centers_m = (1.0, 0.2, 3.0), (0.0, 0.2, 5.0), (0.0, 0.2, 7.2), (-2.0, 0.2, 7.2)
-            connections.send(BOXES3D_TOPIC, boxes(stamp_ns, centers_m=centers_m))
-        message, markers = (connections.publishers[topic].newest for topic in (TRACKS_TOPIC, MARKERS_TOPIC))
-    assert message.header == header_at(stamp_ns, 'map')
-    assert sorted(round(track.pose.pose.position.y) for track in message.objects) == [-1, 2]
-    assert AREA in [marker.ns for marker in markers.markers]
-    assert node._diagnostics.counts['boxes in ignored areas'] >= 20
-
-
 @pytest.fixture
 def viewer(tmp_path):
     """viewer_node, whose session is a folder to be created."""
@@ -260,30 +216,3 @@ def test_captures_are_appended_and_an_image_is_stored_once(viewer):
         np.testing.assert_array_equal(read_depth(frame, session).values, imgmsg_to_depth(messages[DEPTH_TOPIC]).values)
         assert frame.boxes_px == ((26, 8, 38, 44),)
         np.testing.assert_allclose([detection.estimate_m for detection in frame.detections], [[0.5, 0.1, 3.0]])
-
-
-def test_images_without_boxes_are_stored_after_a_warning(viewer):
-    for number in range(12):
-        messages = good_messages(START_NS + number * NS // 10)
-        del messages[BOXES_TOPIC], messages[BOXES3D_TOPIC]
-        send_image(viewer, START_NS + number * NS // 10, messages)
-    is_stored, answer = viewer.node.capture()
-    assert not is_stored and 'no 3D boxes received on /ros_3d_bb/bb_3d' in answer
-    assert viewer.node.capture()[0]
-    stored, = read_session(viewer.folder).frames
-    assert stored.stamp_ns == START_NS + 11 * NS // 10 and stored.detections == ()
-
-
-def test_the_tilt_of_the_camera_is_stored_once_it_is_known(tmp_path):
-    """The person is estimated upright in the floor frame, as by bbox3d_node."""
-    with masterless({'window': False, 'session': str(tmp_path)}) as connections:
-        node = ViewerNode()
-        for number in range(2):
-            stamp_ns = START_NS + number * NS // 10
-            for topic, message in good_messages(stamp_ns).items():
-                if topic in connections.subscribers:
-                    connections.send(topic, message)
-            assert node.capture()[0]
-            connections.send('/tf', transforms(stamp_ns))
-    unknown, known = read_session(str(tmp_path)).frames
-    assert unknown.up is None and known.up.tolist() == [0, -1, 0]

@@ -103,8 +103,7 @@ def upright(recorded, tmp_path_factory):
     return processed(folder)[0]
 
 
-@pytest.mark.parametrize('turns', [1, 2, 3])
-@pytest.mark.parametrize('with_tf', [True, False])
+@pytest.mark.parametrize('turns, with_tf', [(1, True), (2, False), (3, False)])
 def test_a_rotated_camera_gives_the_same_positions(recorded, upright, tmp_path, turns, with_tf):
     """Height, tilt and rotation replace tf."""
     options = '--camera-height %s --camera-tilt %s --image-rotation %d' % (HEIGHT_M, TILT_RAD, 90 * turns)
@@ -137,16 +136,6 @@ def doctor_on(path):
     given = argparse.Namespace(bag=str(path), camera='', target_frame='', depth='aligned')
     found, command, _purpose = bag_findings(given)
     return {finding.subject: finding.fault or finding.fact for finding in found}, command
-
-
-def test_the_doctor_fits_height_tilt_and_roll_to_the_floor(rolled):
-    found, command = doctor_on(rolled[0] / 'in.bag')
-    assert 'image rotation' not in found
-    options = re.search(r'--camera-height (\S+) --camera-tilt (\S+) --camera-roll (\S+)', command)
-    height_m, *angles_rad = map(float, options.groups())
-    assert height_m == pytest.approx(HEIGHT_M, abs=0.05)
-    assert angles_rad == pytest.approx([TILT_RAD, ROLL_RAD], abs=np.radians(1))
-    assert found['floor'].startswith('the camera is %.2f m above it' % height_m)
 
 
 @pytest.mark.parametrize('turns, late_ns', [(1, 0), (3, 20000000)])
@@ -271,7 +260,6 @@ def test_launch_arguments_publish_the_pose_of_a_camera_alone(degrees):
 
 @pytest.mark.parametrize('launch_file, given, named', [
     ('pipeline.launch', ['cameras:=front,rear', 'camera_height:=1.2'], ['cameras', 'camera_height']),
-    ('jackal.launch', ['driver:=none', 'cameras:=front,rear', 'camera_height:=1.2'], ['cameras', 'camera_height']),
     ('pipeline.launch', ['cameras:=front,rear', 'frame_id:=optical'], ['cameras', 'frame_id']),
     ('pipeline.launch', ['camera_tilt:=0.1'], ['camera_height', 'camera_tilt']),
     ('pipeline.launch', ['camera_pose:=wall'], ['camera_pose', 'floor']),
@@ -279,10 +267,8 @@ def test_launch_arguments_publish_the_pose_of_a_camera_alone(degrees):
     ('pipeline.launch', ['cameras:=front,rear', 'camera_pose:=floor'], ['cameras', 'camera_pose']),
     ('measure.launch', ['session:=/s', 'camera_root:=camera_link'], ['camera_height', 'camera_root']),
     ('pipeline.launch', ['camera_height:=1,2'], ['camera_height', '1,2', 'metres']),
-    ('playback.launch', ['bag:=/b.bag', 'camera_height:=120'], ['camera_height', '120', 'metres']),
     ('measure.launch', ['session:=/s', 'camera_height:=1', 'camera_tilt:=20'], ['camera_tilt', '20', 'radians']),
     ('jackal.launch', ['driver:=none', 'mount:=0.1 0 0,4 0 0 0'], ['mount', '0,4', 'six numbers']),
-    ('jackal.launch', ['driver:=none', 'mount:=0.1 0 0.4'], ['mount', '0.1 0 0.4', 'six numbers']),
     ('jackal.launch', ['driver:=realsense'], ['driver', 'realsense2_camera', 'pyrealsense2']),
     ('realsense.launch', ['file:=/a.bag', 'driver:=realsense2_camera'], ['file', 'driver', 'pyrealsense2'])])
 def test_unusable_launch_arguments_are_refused(launch_file, given, named):

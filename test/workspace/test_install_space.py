@@ -68,9 +68,9 @@ def test_each_script_imports_what_it_needs(installed):
 def test_a_scene_becomes_a_bag_boxes_tracks_and_a_report(installed, tmp_path):
     scene, result, picture = tmp_path / 'scene.bag', tmp_path / 'result.bag', tmp_path / 'report.png'
     scenario = os.path.join(installed, 'share', 'ros_3d_bb', 'config', 'scenarios', 'thesis_b_moving.yaml')
-    run_in(installed, 'rosrun ros_3d_bb', 'scenario_to_bag', scenario, scene, '--images', '20', '--boxes')
+    run_in(installed, 'rosrun ros_3d_bb', 'scenario_to_bag', scenario, scene, '--images', '8', '--boxes')
     run_in(installed, 'rosrun ros_3d_bb', 'process_bag', '--detector', 'none', scene, result)
-    assert '20 of 20 images answered' in run_in(installed, 'rosrun ros_3d_bb', 'scene_report', result, picture)
+    assert '8 of 8 images answered' in run_in(installed, 'rosrun ros_3d_bb', 'scene_report', result, picture)
     assert picture.exists()
 
 

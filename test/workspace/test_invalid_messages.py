@@ -4,24 +4,20 @@ import numpy as np
 import pytest
 from std_msgs.msg import Header
 
-from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC as COLOR, DEPTH_TOPIC as DEPTH, INFO_TOPICS
-from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC as BOXES, boxes2d_from_msg, time_from
+from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, time_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray
-from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
-from ros_3d_bb.visualization import image_overlay
 from support.inputs import TARGETS, good_messages, send_image, transforms
 from support.masterless import masterless, on_the_wire
 
-INFO = INFO_TOPICS[0]
 START_NS, PERIOD_NS = 1000 * NS, NS // 30
-TEXTS = ('', 'no_such_frame', '/camera', 'x' * 1000, '%s%n', 'do\x07g', ';stamp=1.000000000;stamp=x', ';scores=nan',
-         ';classes=dog,', 'boxes;stamp=0.000000000;frame=camera', '16UC1', 'bayer_rggb8', 'equidistant')
-FLOATS = float('nan'), float('inf'), -float('inf'), 0.0, -1.0, 3e38
+TEXTS = ('', 'no_such_frame', 'x' * 1000, '%s%n', 'do\x07g', ';stamp=1.000000000;stamp=x', ';scores=nan',
+         'boxes;stamp=0.000000000;frame=camera', 'bayer_rggb8', 'equidistant')
+FLOATS = float('nan'), -1.0, 3e38
 DURATIONS = genpy.Duration(), genpy.Duration(-5), genpy.Duration(2 ** 31 - 1)
 EXTREME_TIMES = genpy.Time(), genpy.Time(0, 1), genpy.Time(2 ** 32 - 1, NS - 1)
-OFFSETS_S = -900, -5, 10, 3600
+OFFSETS_S = -5, 3600
 
 
 def fields_of(message):
@@ -43,7 +39,7 @@ def others(kind, value, stamp_ns):
     if bracket:
         firsts = others(element, value[0], stamp_ns) if len(value) else []
         changed = [[first] + list(value[1:]) for first in firsts]
-        return changed if length != ']' else changed + [[], list(value[:-1]), list(value) * 2, list(value) * 100]
+        return changed if length != ']' else changed + [[], list(value[:-1]), list(value) * 100]
     if '/' in kind:
         return [type(value)()]
     if kind == 'time':
@@ -53,7 +49,7 @@ def others(kind, value, stamp_ns):
     if 'int' in kind:
         bits = int(kind.lstrip('uint'))
         low, high = (0, 2 ** bits - 1) if kind.startswith('u') else (-2 ** (bits - 1), 2 ** (bits - 1) - 1)
-        return {low, high, max(value - 1, low), min(value + 1, high)}
+        return {low, high, min(value + 1, high)}
     return {'string': TEXTS, 'duration': DURATIONS, 'bool': (not value,)}[kind]
 
 
@@ -110,36 +106,3 @@ def test_transforms_with_stamps_that_tf2_cannot_represent_are_ignored(topic):
             connections.send(topic, transforms(secs * NS))
         connections.send('ros_3d_bb/bb_3d', BoundingBox3DArray(header=Header(stamp=genpy.Time(100), frame_id='camera')))
         assert connections.publishers['ros_3d_bb/tracks'].count == 1
-
-
-def test_edges_far_outside_the_image_are_clipped(monkeypatch):
-    """OpenCV needs a tenth of a second for an edge of 2^31 pixels."""
-    corners = []
-    monkeypatch.setattr('cv2.rectangle', lambda _image, *given: corners.extend(given[0] + given[1]))
-    image_overlay.draw_boxes(np.zeros((48, 64, 3), np.uint8),
-                             np.array([[-2 ** 31, 5, 2 ** 31 - 1, 20], [3, 4, 9, 1e300]]), ['', ''])
-    assert corners == [-4, 5, 68, 20, 3, 4, 9, 52]
-
-
-def test_labels_of_neighbours_do_not_overlap(monkeypatch):
-    filled = []
-    monkeypatch.setattr('cv2.rectangle', lambda _image, start, end, _color, thickness: (
-        filled.append(start + end) if thickness < 0 else None))
-    boxes_px = np.array([[10, 40, 60, 200], [40, 45, 90, 200], [20, 40, 70, 200], [300, 40, 360, 200]])
-    image_overlay.draw_boxes(np.zeros((480, 640, 3), np.uint8), boxes_px, ['person 2.10 m'] * 4)
-    for number, (left, top, right, bottom) in enumerate(filled):
-        for other_left, other_top, other_right, other_bottom in filled[:number]:
-            assert left >= other_right or right <= other_left or top >= other_bottom or bottom <= other_top
-    assert filled[3][3] == 40
-
-
-def test_boxes_are_processed_even_if_the_colour_image_is_invalid():
-    """Two arrays of boxes wait for one depth image."""
-    with masterless() as connections:
-        Bbox3dNode()
-        for stamp_ns, order in ((10 ** 12, (INFO, DEPTH, BOXES)), (2 * 10 ** 12, (INFO, COLOR, BOXES, BOXES, DEPTH))):
-            messages = good_messages(stamp_ns)
-            messages[COLOR].step = 1
-            for topic in order:
-                connections.send(topic, messages[topic])
-        assert connections.publishers['ros_3d_bb/bb_3d'].count == 3

@@ -1,6 +1,6 @@
 """Parameters, nodes and topics that launch files set for their arguments, with stand-ins for realsense2_camera.
 
-test_package.py loads each launch file, test_camera_mount.py those with the pose of a camera. test/nodes/navigation.test
+test_pages.py loads each launch file, test_camera_mount.py those with the pose of a camera. test/nodes/navigation.test
 runs navigation.launch with the planners.
 """
 import ast
@@ -9,7 +9,6 @@ import os
 import shlex
 from xml.etree import ElementTree
 
-import numpy as np
 import pytest
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPICS, INFO_TOPICS
@@ -30,10 +29,6 @@ ROBOT_NODES = ['camera_mount', 'people_node', 'planner_bridge_node', 'realsense_
 CASES = [
     (MEASURE, {'nodes': ['people_node', 'viewer_node'], '/viewer_node/session': '/a session',
                '/viewer_node/window': True, '/tracker_node/target_frame': 'map'}),
-    (MEASURE + 'camera:=true driver:=pyrealsense2', {'nodes': ['people_node', 'realsense_node', 'viewer_node']}),
-    (MEASURE + 'camera_image:=a/color bb_topic:=a/boxes', {
-        'viewer_node:camera/color/image_raw': 'a/color', 'people_node:camera/color/image_raw': 'a/color',
-        'viewer_node:yolo_bounding_box': 'a/boxes', 'people_node:yolo_bounding_box': 'a/boxes'}),
     (OWN_DRIVER + 'width:=848 fps:=15 exposure:=0.008', {
         'nodes': ['realsense_node'], '/use_sim_time': None, '/realsense_node/frame_prefix': 'camera',
         '/realsense_node/width': 848, '/realsense_node/height': 480, '/realsense_node/fps': 15,
@@ -56,8 +51,6 @@ CASES = [
         GLOBAL + 'rolling_window': None, LOCAL + 'global_frame': 'odom', GLOBAL + 'global_frame': 'map',
         LOCAL + 'robot_base_frame': 'base_link', LOCAL + 'obstacle_layer/scan/topic': 'front/scan',
         '/move_base/DWAPlannerROS/odom_topic': 'odometry/filtered'}),  # the names of a Jackal
-    ('jackal.launch driver:=none weights:=/some.pt', {
-        '/tracker_node/target_frame': 'map', '/bbox3d_node/floor_frame': 'base_link'}),
     (OF_USER, {
         LOCAL + 'global_frame': 'my_odom', GLOBAL + 'global_frame': 'my_map', LOCAL + 'robot_base_frame': 'my_base',
         GLOBAL + 'robot_base_frame': 'my_base', LOCAL + 'obstacle_layer/scan/topic': 'my_scan',
@@ -70,17 +63,9 @@ CASES = [
         '/planner_bridge_node/outputs': 'costmap, teb', LOCAL + 'people_layer/observation_sources': 'clearing',
         LOCAL + 'people_layer/clearing/expected_update_rate': 0.5, LOCAL + 'prediction_layer/enabled': False,
         'move_base:~TebLocalPlannerROS/obstacles': 'planner_bridge_node/obstacles'}),
-    ('navigation.launch global_costmap:=rolling', {
-        'global layers': ['obstacle_layer', 'people_layer', 'inflation_layer']}),
     ('navigation.launch global_costmap:=social', {
         '/planner_bridge_node/outputs': 'costmap, people',
         'global layers': ['static_layer', 'obstacle_layer', 'people_layer', 'proxemic_layer', 'inflation_layer']}),
-    ('pipeline.launch detector:=depth depth:=raw', {
-        '/detector_node/depth': 'raw', '/bbox3d_node/depth': 'raw', '/tracker_node/depth': 'raw',
-        'people_node:camera/depth/image_rect_raw': 'camera/depth/image_rect_raw'}),
-    ('pipeline.launch detector:=depth cameras:=front', {
-        '/front/detector_node/depth': 'aligned', '/front/bbox3d_node/depth': 'aligned',
-        '/tracker_node/cameras': 'front', '/people_node/detector': None}),
     ('pipeline.launch detector:=depth depth:=raw rviz:=true cameras:="front, rear"', {
         '/front/detector_node/depth': 'raw', '/rear/bbox3d_node/depth': 'raw', '/tracker_node/depth': 'raw',
         '/tracker_node/cameras': 'front, rear', 'rviz:yolo_result_out': 'front/yolo_result_out',
@@ -143,23 +128,6 @@ def test_files_of_the_user_take_precedence(tmp_path):
     assert parameters['/planner_bridge_node/timeout'] == 3.0
     assert parameters['/move_base/DWAPlannerROS/max_vel_x'] == 0.4
     assert parameters['/move_base/DWAPlannerROS/max_vel_theta'] == 1.5
-
-
-@pytest.mark.parametrize('local_planner, group', [('dwa', 'DWAPlannerROS'), ('teb', 'TebLocalPlannerROS')])
-def test_commands_are_within_the_limits_of_a_jackal(local_planner, group):
-    """Those of its controller and twist_mux, github.com/jackal/jackal (commit c6ab6ca)."""
-    parameters, _nodes = loaded('navigation.launch', 'local_planner:=' + local_planner)
-    for name, limit in (('max_vel_x', 2.0), ('acc_lim_x', 20.0), ('max_vel_theta', 4.0), ('acc_lim_theta', 25.0)):
-        assert parameters['/move_base/%s/%s' % (group, name)] <= limit
-    assert 1 / parameters['/move_base/controller_frequency'] < 0.25  # it stops the robot when commands stay away
-    half_m = np.min(np.abs(parameters[LOCAL + 'footprint']), axis=0) + parameters[LOCAL + 'footprint_padding']
-    assert (half_m >= (0.229, 0.208)).all()  # the wheels
-
-
-def test_the_footprint_of_the_local_planner_and_the_costmaps_is_one():
-    parameters, _nodes = loaded('navigation.launch', 'local_planner:=teb')
-    assert (parameters[LOCAL + 'footprint'] == parameters[GLOBAL + 'footprint']
-            == parameters['/move_base/TebLocalPlannerROS/footprint_model/vertices'])
 
 
 # With a stand-in for the driver, which rejects arguments that are not those of the release.

@@ -120,25 +120,3 @@ def test_tracks_that_are_not_visible_are_paler_and_have_a_question_mark(coloring
     assert drawn([track(3)._replace(label='dog')], params)['id', 3].text == 'dog 3'
     for namespace in ('cylinder', 'velocity', 'prediction'):
         assert 0.1 < unseen[namespace, 3].color.a < seen[namespace, 3].color.a / 2
-
-
-def test_new_parameters_apply_to_the_next_image():
-    """The history continues, because it is recorded even while it is not drawn."""
-    writer = MarkerWriter(MarkerParams(marker_namespaces=['cylinder', 'id']))
-    writer.write([track(3)], header_at(SECOND_NS, 'map'))
-    writer.reconfigure(MarkerParams(marker_namespaces=['cylinder', 'history'], marker_lifetime=0.5))
-    markers = writer.write([track(3, position=(2.5, 1.0, 0.9))], header_at(SECOND_NS + NS, 'map'))
-    assert sorted(keys(markers)) == [('cylinder', 3), ('history', 3)]
-    assert keys(markers, Marker.DELETE) == [('id', 3)]
-    assert all(marker.lifetime.to_sec() == 0.5 for marker in markers.markers if marker.action == Marker.ADD)
-
-
-@pytest.mark.parametrize('namespace,attribute', [(AREA, 'areas_m'), (VIEW, 'views_m')])
-def test_areas_and_views_are_outlines_on_the_floor_until_removed(namespace, attribute):
-    writer = MarkerWriter(MarkerParams())
-    setattr(writer, attribute, [np.array([[1.0, 2.0], [3.0, 2.0], [3.0, 4.0]])])
-    marker, = writer.write([], header_at(SECOND_NS, 'map')).markers
-    assert (marker.ns, marker.id, marker.type) == (namespace, 0, Marker.LINE_STRIP)
-    np.testing.assert_allclose(xyz(marker)[:, :2], [[1, 2], [3, 2], [3, 4], [1, 2]])
-    setattr(writer, attribute, [])
-    assert keys(writer.write([], header_at(2 * SECOND_NS, 'map')), Marker.DELETE) == [(namespace, 0)]

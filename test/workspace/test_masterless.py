@@ -2,26 +2,17 @@
 import json
 from typing import NamedTuple
 
-import genpy
 import numpy as np
 import pytest
-from std_msgs.msg import Header
 
 from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.process_bag import main
-from ros_3d_bb.camera.camera_model import Camera
-from ros_3d_bb.camera.images import DepthImage, mounted_camera
-from ros_3d_bb.conversions import image_msgs
-from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, TF_TOPIC, CameraFrame, messages_of
-from ros_3d_bb.conversions.compressed_images import decode
-from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg
-from ros_3d_bb.core.latest_worker import NewestWorker
+from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC
+from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC
 from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.detection.boxes import Detections
 from ros_3d_bb.detection.detector import Detector
-from ros_3d_bb.nodes import people_node, tracker_node
 from ros_3d_bb.nodes.bbox3d_node import Bbox3dNode
-from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.nodes.detector_node import DetectorNode
 from ros_3d_bb.nodes.people_node import PeopleNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
@@ -31,7 +22,6 @@ from support.bags import changed_bag, messages_in, scene_bag
 from support.code_blocks import blocks_in
 from support.compressed import compressed
 from support.masterless import masterless, published
-from support.ros import wait_until
 
 
 @parameters('Detector middle')
@@ -57,7 +47,8 @@ def example():
     return names['MiddleDetector']
 
 
-SCENE = {'duration': 1.5, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}]}
+IMAGES = 8
+SCENE = {'duration': IMAGES / 10, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}]}
 
 
 CODECS = {'plain': {}, 'compressed': {COLOR_TOPIC: 'jpeg', DEPTH_TOPIC: 'compressedDepth'}}
@@ -77,29 +68,18 @@ def bags(request, tmp_path_factory):
     return str(folder / 'in.bag'), str(folder / 'out.bag')
 
 
-@pytest.mark.parametrize('node_class, input_bag, params, topics', [
-    (DetectorNode, 0, {'detector': 'depth'}, ['yolo_bounding_box']), (Bbox3dNode, 1, {}, ['ros_3d_bb/bb_3d']),
-    (TrackerNode, 1, {'tf_timeout': 0.0}, ['ros_3d_bb/tracks', 'visualization_marker_array']),
-    (PeopleNode, 0, {'detector_node': {'detector': 'depth'}}, [
-        'yolo_bounding_box', 'ros_3d_bb/bb_3d', 'ros_3d_bb/tracks'])])
+@pytest.mark.parametrize('bags, node_class, input_bag, params, topics', [
+    ('plain', DetectorNode, 0, {'detector': 'depth'}, ['yolo_bounding_box']),
+    ('plain', Bbox3dNode, 1, {}, ['ros_3d_bb/bb_3d']),
+    ('plain', TrackerNode, 1, {'tf_timeout': 0.0}, ['ros_3d_bb/tracks', 'visualization_marker_array']),
+    ('compressed', PeopleNode, 0, {'detector_node': {'detector': 'depth'}}, [
+        'yolo_bounding_box', 'ros_3d_bb/bb_3d', 'ros_3d_bb/tracks'])], indirect=['bags'])
 def test_process_bag_writes_the_messages_that_the_nodes_publish(bags, node_class, input_bag, params, topics):
     found = published(node_class, bags[input_bag], params, topics)
     for topic in topics:
         expected = messages_in(bags[1], '/' + topic)['/' + topic]
-        assert len(expected) == 15
+        assert len(expected) == IMAGES
         assert [str(message) for message in found[topic]] == [str(message) for message in expected]
-
-
-@pytest.mark.parametrize('bags', ['compressed'], indirect=True)
-def test_people_node_and_process_bag_decode_each_image_once(bags, tmp_path, monkeypatch):
-    decoded = []
-    monkeypatch.setattr(image_msgs, 'decode', lambda text, data: decoded.append(text) or decode(text, data))
-    published(PeopleNode, bags[0], {'detector_node': {'detector': 'depth'}}, [TRACKS_TOPIC])
-    of_node = sorted(decoded)
-    del decoded[:]
-    process_bag(bags[0], str(tmp_path / 'out.bag'), Settings(detector='depth', names=NAMES))
-    assert of_node == sorted(decoded) and len(decoded) == 30
-    assert sum('compressedDepth' in text for text in decoded) == 15
 
 
 @pytest.mark.parametrize('bags', ['plain'], indirect=True)
@@ -114,7 +94,7 @@ def test_a_detector_in_the_registry_runs_in_bags_and_nodes(bags, tmp_path, monke
     topics = [BOXES_TOPIC, BOXES3D_TOPIC, TRACKS_TOPIC]
     found = published(PeopleNode, bags[0], {'detector_node': dict(params, detector='middle')}, topics)
     expected = messages_in(tmp_path / 'out.bag')
-    assert len(found[BOXES_TOPIC]) == 15 and found[BOXES_TOPIC][0].data == (256, 0, 384, 480)
+    assert len(found[BOXES_TOPIC]) == IMAGES and found[BOXES_TOPIC][0].data == (256, 0, 384, 480)
     for topic in topics:
         assert list(map(str, found[topic])) == list(map(str, expected['/' + topic]))
 
@@ -124,27 +104,3 @@ def test_a_detector_in_the_registry_runs_in_bags_and_nodes(bags, tmp_path, monke
 def test_an_unknown_detector_is_an_error_that_names_the_known_ones(node_class, stored):
     with masterless(stored), pytest.raises(ValueError, match="'dept'; did you mean depth.*depth, yolov5"):
         node_class()
-
-
-def test_the_other_parts_of_people_node_do_not_wait_for_late_transforms(monkeypatch):
-    """The detector would skip images meanwhile."""
-    monkeypatch.setattr(tracker_node, 'Transforms', lambda _wait_s: Transforms(wait_s=3.0))
-    camera, depth_mm = Camera(64, 48, 60.0, 60.0, 31.5, 23.5), np.full((48, 64), 2000, np.uint16)
-    late = []
-    with masterless({'detector_node': {'detector': 'none'}}) as connections:
-        monkeypatch.setattr(people_node, 'NewestWorker', NewestWorker)
-        PeopleNode()
-        for number in range(3):
-            header = Header(stamp=genpy.Time(1, number * 10 ** 8), frame_id='camera')
-            frame = CameraFrame(header, camera, np.zeros((48, 64, 3), np.uint8), DepthImage(depth_mm, 0.001),
-                                [('map', 'camera', mounted_camera(1.0, 0.0, 0))])
-            for topic, message in messages_of(frame):
-                if topic == TF_TOPIC:
-                    late.append(message)
-                elif topic in connections.subscribers:
-                    connections.send(topic, message)
-            connections.send(BOXES_TOPIC, boxes2d_to_msg([(20, 10, 40, 45)], header))
-        assert connections.publishers[BOXES3D_TOPIC].count == 3 and connections.publishers[TRACKS_TOPIC].count == 0
-        for message in late:
-            connections.send('/tf', message)
-        wait_until(lambda: connections.publishers[TRACKS_TOPIC].count == 3, 'tracks of each image')

@@ -81,15 +81,6 @@ def bridge_with(outputs, **params):
         yield Bridge(found)
 
 
-def test_no_frame_of_an_output_has_a_slash_which_tf2_rejects():
-    with bridge_with('costmap, people, teb', robot_frame='/base_link', planner_frame='/odom') as bridge:
-        bridge.send_tf(START_NS, 'base_link', (0, 0, 0))
-        bridge.send_tf(START_NS, 'odom', (0, 0, 0))
-        bridge.send(START_NS, person(1, 2, 0), frame_id='/map')
-        assert [bridge.message(topic).header.frame_id for topic in (POINTS, COSTS, RING, PEOPLE, TEB)] == [
-            'base_link', 'base_link', 'base_link', 'map', 'odom']
-
-
 def test_costs_are_around_the_robot_where_it_is_now():
     """Since the image it has moved by 1 m, which the layer of the costmap assumes, too."""
     with bridge_with('costmap') as bridge:
@@ -166,21 +157,6 @@ def test_an_output_that_raises_is_counted_and_the_others_are_published():
         assert bridge.counts['outputs failed'] == 1 and bridge.counts['tracks forwarded'] == 1
 
 
-def test_without_transform_each_output_is_emptied_once():
-    """The ring stays away, which costmap_2d notices (expected_update_rate)."""
-    with bridge_with('costmap, people') as bridge:
-        bridge.send_tf(START_NS, 'base_link', (0, 0, 0))
-        bridge.send(START_NS, person(1, 2, 0))
-        for step in range(1, 15):
-            bridge.set_time(START_NS + step * NS // 10)
-            bridge.send(bridge.now_ns, person(1, 2, 0))
-            bridge.tick()
-        assert (bridge.count(POINTS), bridge.count(RING)) == (2, 1) and bridge.counts['outputs emptied'] == 2
-        frame_id, points = bridge.newest(POINTS)
-        assert frame_id == 'base_link' and len(points) == 0
-        assert len(bridge.newest(PEOPLE)[1]) == 1
-
-
 @pytest.mark.parametrize('jump_s', [-100.0, -0.5, 1.5, 100.0])
 def test_a_jump_of_the_clock_empties_every_output_until_the_next_tracks(jump_s):
     with bridge_with('people, costmap') as bridge:
@@ -195,16 +171,6 @@ def test_a_jump_of_the_clock_empties_every_output_until_the_next_tracks(jump_s):
             bridge.send_tf(bridge.now_ns, 'base_link', (0, 0, 0))
             bridge.send(bridge.now_ns, person(1, 2, 0))
         assert len(bridge.newest(POINTS)[1]) and len(bridge.newest(PEOPLE)[1]) == 1
-
-
-@pytest.mark.parametrize('resend_period', [0.05, 0.1, 8.0])
-def test_the_timeout_does_not_wait_for_the_resend_period(resend_period):
-    with bridge_with('people', resend_period=resend_period) as bridge:
-        bridge.send(START_NS, person(1, 2, 0))
-        bridge.wait(0.9)
-        assert len(bridge.newest(PEOPLE)[1]) == 1
-        bridge.wait(0.3)
-        assert len(bridge.newest(PEOPLE)[1]) == 0
 
 
 def test_the_empty_arrays_of_the_shutdown_are_the_last_messages():

@@ -1,11 +1,9 @@
 """Tracks as planners read them: each message is serialized."""
-import os
 import sys
 from unittest import mock
 
 import numpy as np
 import pytest
-import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_msgs.msg import OccupancyGrid
@@ -28,7 +26,6 @@ from support.planner_definitions import PUBLISHED_MD5, message_class, package
 from support.ros import header_at
 from support.tracks import track_at
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 QUARTER = transform_from((10, 5, 0), (0, 0, np.sqrt(0.5), np.sqrt(0.5)))  # odom_from_map: a quarter turn to the left
 STAMP_NS = 1000 * NS
 
@@ -152,15 +149,6 @@ def test_the_costmap_needs_no_package_and_no_ring_where_its_range_is_zero():
     assert [(output.topic, output.kind) for output in outputs_from(PlannerBridgeParams())] == [
         ('~points', PointCloud2), ('~costs', OccupancyGrid), ('~clearing_points', PointCloud2)]
     assert [output.topic for output in outputs_from(PlannerBridgeParams(clearing_range=0.0))] == ['~points', '~costs']
-
-
-def test_the_shipped_costmap_clears_within_the_ring_and_times_out():
-    """The limits of time are shorter than `timeout`, after which the points are emptied."""
-    with open(os.path.join(ROOT, 'config', 'move_base', 'local_costmap.yaml')) as stream:
-        layer = yaml.safe_load(stream)['people_layer']
-    people, clearing = (layer[name] for name in layer['observation_sources'].split())
-    assert people['obstacle_range'] < clearing['raytrace_range'] <= PlannerBridgeParams().clearing_range
-    assert all(0 < source['expected_update_rate'] < PlannerBridgeParams().timeout for source in (people, clearing))
 
 
 def test_the_example_of_an_output_converts_tracks():

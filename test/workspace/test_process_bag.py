@@ -2,7 +2,6 @@ import contextlib
 import filecmp
 import io
 import os
-import re
 import signal
 import subprocess
 
@@ -10,19 +9,14 @@ import genpy.dynamic
 import numpy as np
 import pytest
 import rosbag
-import tf2_ros
-from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.bag_reader import BagError, BagReader
-from ros_3d_bb.bags.bag_tf_buffer import BagTransforms
 from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.bags.process_bag import main, with_params
-from ros_3d_bb.conversions.camera_msgs import START_NS, transform_messages
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, time_from, tracks_from_msg
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.box3d import NO_DEPTH
 from ros_3d_bb.pipeline.people_pipeline import Settings
 from ros_3d_bb.sessions.session_reader import read_session
 from support.bags import changed_bag, messages_in, scene_bag, session_images
@@ -101,14 +95,6 @@ def test_without_detector_the_boxes_in_the_bag_are_used(session_bag, tmp_path):
         assert len(boxes3d.boxes) == len(boxes2d.data) // 4
 
 
-def test_names_without_a_slash_are_those_of_the_nodes(scene, tmp_path):
-    """rosbag record stores the names of topics as they are given on its command line."""
-    recorded = changed_bag(scene, tmp_path / 'in.bag', lambda topic, *rest: (topic[1:],) + rest)
-    process_bag(scene, str(tmp_path / 'expected.bag'), DEPTH)
-    process_bag(recorded, str(tmp_path / 'out.bag'), DEPTH)
-    assert messages_in(tmp_path / 'out.bag') == messages_in(tmp_path / 'expected.bag')
-
-
 def test_topics_can_be_remapped_and_a_missing_one_is_named(scene, tmp_path):
     renamed = changed_bag(scene, tmp_path / 'in.bag', lambda topic, *rest: (
         topic.replace('/camera/', '/front/'),) + rest)
@@ -130,48 +116,6 @@ def test_without_transforms_the_summary_names_the_cause(scene, tmp_path):
     assert '/ros_3d_bb/tracks' not in found and len(found['/ros_3d_bb/bb_3d']) == 15
 
 
-def test_without_positions_the_summary_names_the_reason_of_each_box(tmp_path):
-    def without_depth(topic, message, time):
-        if topic.endswith('aligned_depth_to_color/image_raw'):
-            message.data = bytes(len(message.data))
-        return topic, message, time
-    scene = scene_bag(tmp_path / 'scene.bag', dict(SCENE, duration=0.1), with_boxes=True)
-    path = changed_bag(scene, tmp_path / 'in.bag', without_depth)
-    counts = process_bag(path, str(tmp_path / 'out.bag'), Settings(detector='none')).counts
-    printed = run_tool(path, tmp_path / 'out.bag', '--detector', 'none')
-    assert counts[NO_DEPTH] and printed.splitlines()[-1].endswith(' %d %s' % (counts[NO_DEPTH], NO_DEPTH))
-
-
-def test_images_far_apart_need_the_tolerance_named_by_the_message(tmp_path):
-    def older(topic, message, time):
-        if 'depth' in topic:
-            message.header.stamp -= genpy.Duration(0, 112 * NS // 1000)
-        return topic, message, time
-    scene = scene_bag(tmp_path / 'scene.bag', dict(SCENE, duration=0.1), with_boxes=True)
-    path, settings = changed_bag(scene, tmp_path / 'in.bag', older), Settings(detector='none')
-    sentence = process_bag(path, str(tmp_path / 'out.bag'), settings).sentences['2D boxes rejected']
-    tolerance_s = float(re.search(r'~stamp_tolerance: ([0-9.]+)', sentence).group(1))
-    process_bag(path, str(tmp_path / 'out.bag'), with_params(settings, 'bbox3d', stamp_tolerance=tolerance_s))
-    assert len(messages_in(tmp_path / 'out.bag')['/ros_3d_bb/bb_3d'][0].boxes) == 2
-
-
-def test_tracks_have_new_ids_after_a_jump_back_in_time(scene, tmp_path):
-    """Stamps and transforms go back by 60 s halfway, as in a recording of a bag that was played twice."""
-    def change(topic, message, time):
-        if time.to_nsec() > START_NS + NS * 7 // 10:
-            for stamped in message.transforms if topic == '/tf' else [message]:
-                stamped.header.stamp = time_from(stamped.header.stamp.to_nsec() - 60 * NS)
-        return topic, message, time
-    changed_bag(scene, tmp_path / 'in.bag', change)
-    events = process_bag(str(tmp_path / 'in.bag'), str(tmp_path / 'out.bag'), DEPTH)
-    assert events.counts['jumps back in time'] == 1 and 'no transform' not in events.counts
-    tracks = messages_in(tmp_path / 'out.bag')['/ros_3d_bb/tracks']
-    assert len(tracks) == 15
-    early, late = (set(track.id for message in tracks for track in message.objects
-                       if (message.header.stamp.to_nsec() > START_NS) == is_early) for is_early in (True, False))
-    assert early and late and not early & late
-
-
 def test_transforms_may_be_later_than_the_image_by_tf_timeout(scene, tmp_path):
     """A tenth of a second is within tf_timeout; half a second is not."""
     for delay_ns, is_known in ((NS // 10, True), (NS // 2, False)):
@@ -190,20 +134,6 @@ def test_transforms_of_old_bags_are_used(scene, tmp_path):
     assert not {'no transform', 'transforms rejected'} & set(events.counts) and events.counts['images with tracks']
 
 
-def test_transforms_of_another_frame_with_old_stamps_change_nothing():
-    """Also after a lookup that failed: the frame `base` remains available at all stamps of its last 10 s."""
-    transforms = BagTransforms()
-    for number in range(100):
-        now_s = 100 + number / 10
-        for stamp_s, child in ((now_s, 'base'), (now_s, 'gps'), (now_s - 20, 'gps')):
-            stamp = time_from(int(stamp_s * NS))
-            transforms.add(TFMessage(transform_messages(stamp, [('map', child, np.eye(4))])))
-        with pytest.raises(tf2_ros.TransformException):
-            transforms.lookup('map', 'base', time_from(int((now_s + 0.1) * NS)))
-    for number in range(99):
-        transforms.lookup('map', 'base', time_from(int((100.05 + number / 10) * NS)))
-
-
 def test_an_output_that_cannot_be_written_is_named_before_the_work(scene, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr('ros_3d_bb.bags.bag_pipeline.BagRun.outputs', lambda _run: pytest.fail('it began'))
     (tmp_path / 'folder').mkdir()
@@ -212,17 +142,6 @@ def test_an_output_that_cannot_be_written_is_named_before_the_work(scene, tmp_pa
             main([scene, str(target), '--detector', 'depth'])
         assert error.value.code == 1 and str(target) in capsys.readouterr().err
     assert os.listdir(str(tmp_path)) == ['folder']
-
-
-def test_two_bags_that_are_written_to_one_name_are_both_whole(tmp_path):
-    """Each image of the first bag is followed by the whole second one."""
-    def images(count, meanwhile=lambda: None):
-        for number in range(count):
-            meanwhile()
-            yield number + 1, [('text', String('some text'))]
-    path = str(tmp_path / 'out.bag')
-    assert write_bag(images(3, lambda: write_bag(images(5), path)), path) == 3
-    assert len(messages_in(path)['/text']) == 3 and os.listdir(str(tmp_path)) == ['out.bag']
 
 
 @pytest.mark.slow

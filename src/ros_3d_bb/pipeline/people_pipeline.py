@@ -26,7 +26,7 @@ from ros_3d_bb.pipeline.rgbd_source import OnMatch, RgbdSource
 from ros_3d_bb.pipeline.tracking_stage import TrackerNodeParams, TrackingStage
 from ros_3d_bb.pipeline.transform_buffer import TransformBuffer
 from ros_3d_bb.tracking.measurement_model import NoiseParams
-from ros_3d_bb.tracking.track import PredictionParams
+from ros_3d_bb.tracking.prediction import PredictionParams
 from ros_3d_bb.tracking.tracker import TrackerParams
 from ros_3d_bb.tracking.types import TrackedObject
 from ros_3d_bb.visualization.markers import MARKERS_TOPIC, MarkerParams, MarkerWriter

@@ -24,7 +24,7 @@ from ros_3d_bb.pipeline.tracking_frame import AUTO, ImagePose, TrackingFrame, tr
 from ros_3d_bb.pipeline.transform_buffer import TransformBuffer
 from ros_3d_bb.tracking.manoeuvres import LONGEST_NS
 from ros_3d_bb.tracking.measurement_model import NoiseParams
-from ros_3d_bb.tracking.track import PredictionParams
+from ros_3d_bb.tracking.prediction import PredictionParams
 from ros_3d_bb.tracking.tracker import Tracker, TrackerParams
 from ros_3d_bb.tracking.types import TrackedObject, detections_from_boxes
 

@@ -186,21 +186,20 @@ def _likely_pairs_of_crowd(tracks: Sequence[Track], measurements: Sequence[Measu
 def height_cost(track: Track, measurement: Measurement, sigma_m: float) -> float:
     """Association cost of the height difference: its negative log likelihood, 0 for the same height.
 
-    The height is unknown if the image border truncates the box, or has truncated all previous boxes of the track, or
-    one shortly before the latest, as detectors may draw the edge of a truncated person inside the image. The tops of
-    the heads are then compared if both are known; otherwise the cost is 0. Where the height is known, the cost is at
-    most that of the tops plus `HIDDEN_FEET_COST` or `HIDDEN_LEGS_COST`, because furniture occludes only the lower part
-    of a body.
+    The height is unknown if the image border truncates the box, or has truncated all previous boxes of the track. The
+    tops of the heads are then compared if both are known; otherwise the cost is 0. Where the height is known, the cost
+    is at most that of the tops plus `HIDDEN_FEET_COST` or `HIDDEN_LEGS_COST`, because furniture occludes only the lower
+    part of a body.
     """
     _left, is_top_cut, _right, is_bottom_cut = measurement.detection.truncated_edges
-    if not track.upper.hits or is_top_cut or track.upper.was_cut(track.last_ns):
+    if not track.upper_hits or is_top_cut:
         return 0.0
     height_m, seen_m = track.size_m[2], measurement.size_m[2]
     if track.is_confirmed:
         sigma_m *= math.sqrt(1 + 1 / track.hits)  # error of the mean of its boxes; other tracks may be of false boxes
     higher_m = track.z_m + height_m / 2 - measurement.z - seen_m / 2
     top_cost = (higher_m / (HEAD_SIGMAS * sigma_m)) ** 2 / 2
-    if not track.lower.hits or is_bottom_cut or track.lower.was_cut(track.last_ns):
+    if not track.lower_hits or is_bottom_cut:
         return top_cost
     hidden_cost = HIDDEN_LEGS_COST if abs(height_m - seen_m - higher_m) > LEGS_M else HIDDEN_FEET_COST
     return min(((height_m - seen_m) / sigma_m) ** 2 / 2, top_cost + hidden_cost)

@@ -199,7 +199,7 @@ def learned_log_scale(log_scale: float, matches: Sequence[Tuple[Any, Measurement
     In the matches (Track, Measurement), the tracks are predicted to the image, and the measurements have the noise for
     the association, with a scale of 1 or more. Errors that last are not in the innovations. The learned noise is that
     part of `noise_unknown` which changes from image to image; the rest is added to the published covariances
-    (`track.learned_prediction`).
+    (`prediction.learned_prediction`).
     """
     scale, total = math.exp(min(log_scale, 0)), 0.0
     for track, measurement in matches:

@@ -6,13 +6,15 @@ detect it. A camera that stops sending images is ignored after a short time.
 """
 import itertools
 import math
-from typing import NamedTuple
+from typing import Dict, Iterable, NamedTuple, Optional, Sequence, Set, Tuple
 
 import numpy as np
 
+from ros_3d_bb.camera.camera_model import Camera
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.kalman_filter import State
-from ros_3d_bb.tracking.track import PRESENT, SEEN, STAYED
+from ros_3d_bb.tracking.track import PRESENT, SEEN, STAYED, Track
 from ros_3d_bb.tracking.types import NEARER_M, OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView, wrapped
 
 # All are chosen; `./run bench scenes` and `./run bench tracking` show the effect of others.
@@ -40,9 +42,9 @@ BEHIND_M = 0.45  # upper bound of the position's standard deviation of a person 
 PRESENT_M = 0.3  # the same of one whose place is occupied
 STOPPING_S = 0.5  # time constant of the velocity of a person who does not come as near as predicted
 PRESENT_NS = 30 * NS  # without a detection for longer, what occupies the place may be a wall, which never leaves
-OCCLUDING_S = 0.3  # a track missed for longer does not occlude others
 # Distance of the tracks of one person in two places, and time for which each is missed by one camera; chosen.
 CONTRADICTING_M, CONTRADICTING_NS = 1.5, 5 * NS
+Visibilities = Dict[int, int]  # by track ID
 
 
 class CameraState(NamedTuple):
@@ -53,13 +55,14 @@ class CameraState(NamedTuple):
     range_m: float
 
 
-def recent_others(cameras, camera, stamp_ns):
+def recent_others(cameras: Dict[str, CameraState], camera: str, stamp_ns: int) -> Dict[str, CameraState]:
     """The {name: CameraState} of each camera but `camera` that is not ignored in an image with this stamp."""
     return {name: other for name, other in cameras.items()
             if name != camera and stamp_ns - other.stamp_ns <= RECENT_NS}
 
 
-def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_probability):
+def mark_missed(missed: Sequence[Track], tracks: Iterable[Track], before: Iterable[Track],
+                cameras: Dict[str, CameraState], camera: str, observed_s: float, detection_probability: float) -> None:
     """Update undetected tracks in place: status, visibility, and the times for which they are unseen and missed.
 
     An occluded person who is predicted to reappear but is not detected is assumed to stay behind the occluder: the
@@ -71,10 +74,10 @@ def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_p
     the tracks after the previous image. `cameras` maps each camera to its CameraState; `camera` is that of the image,
     which accounts for `observed_s` seconds. `detection_probability` is that of a visible person.
     """
-    before = {track.id: track for track in before}
-    occluding = [track for track in tracks if track.is_confirmed and track.missed_s < OCCLUDING_S]
+    former = {track.id: track for track in before}
+    occluding = [track for track in tracks if track.is_confirmed]
     image, others = cameras[camera], recent_others(cameras, camera, cameras[camera].stamp_ns)
-    seen, staying = _seen_and_staying(missed, before, occluding, image, others)
+    seen, staying = _seen_and_staying(missed, former, occluding, image, others)
     views, decay = [image.view] + [other.view for other in others.values()], math.exp(-observed_s / STOPPING_S)
     for track in missed:
         track.set_visibility(camera, seen[track.id], image.stamp_ns)
@@ -82,12 +85,13 @@ def mark_missed(missed, tracks, before, cameras, camera, observed_s, detection_p
         is_known = track.is_confirmed and image.stamp_ns - track.last_ns <= PRESENT_NS
         if best in (PRESENT, STAYED) and not is_known:
             best = OUT_OF_VIEW
-        _hold(track, before[track.id].state, best, track.id in staying, views, decay)
+        _hold(track, former[track.id].state, best, track.id in staying, views, decay)
         track.miss(STATUS[best], 0.0 if best in (PRESENT, STAYED, SEEN) else observed_s,
                    observed_s if best == VISIBLE else 0.0, detection_probability)
 
 
-def _seen_and_staying(missed, before, occluding, image, others):
+def _seen_and_staying(missed: Sequence[Track], before: Dict[int, Track], occluding: Sequence[Track],
+                      image: CameraState, others: Dict[str, CameraState]) -> Tuple[Visibilities, Set[int]]:
     """The visibility {ID: visibility} of missed tracks in the view of a CameraState, and the IDs of those that stay
     behind an occluder, in this one or in those of the `others` {name: CameraState}.
     """
@@ -103,14 +107,15 @@ def _seen_and_staying(missed, before, occluding, image, others):
     return seen, staying
 
 
-def _now_and_before(tracks, before, occluding, image):
+def _now_and_before(tracks: Sequence[Track], before: Dict[int, Track], occluding: Sequence[Track],
+                    image: CameraState) -> Tuple[Visibilities, Visibilities]:
     """The `_visibilities` of tracks, and of those that should be visible, the `_former_visibilities`."""
     seen = _visibilities(tracks, occluding, image)
     return seen, _former_visibilities([track for track in tracks if seen[track.id] == VISIBLE], before, occluding,
                                       image)
 
 
-def _hold(track, former, seen, is_staying, views, decay):
+def _hold(track: Track, former: State, seen: int, is_staying: bool, views: Iterable[CameraView], decay: float) -> None:
     """Keep an undetected track near its former State where its visibility `seen` shows that the person has not gone on;
     `decay` is the share of the velocity that one who stops keeps."""
     if seen == STAYED or seen == PRESENT and not track.is_moving:
@@ -123,7 +128,7 @@ def _hold(track, former, seen, is_staying, views, decay):
         _stop(track, former, decay)
 
 
-def contradicting_cameras(tracks, stamp_ns):
+def contradicting_cameras(tracks: Iterable[Track], stamp_ns: int) -> Optional[Tuple[str, str]]:
     """The names of two cameras that seem to show one person in two places, None without: for `CONTRADICTING_NS`, each
     has one of two tracks nearby in view and does not detect it, while it detects the other one, and at most one of the
     tracks is occluded.
@@ -140,11 +145,11 @@ def contradicting_cameras(tracks, stamp_ns):
         if distance_m < CONTRADICTING_M and track.kind.group == other.kind.group:
             for camera, other_camera in itertools.product(detecting & other_missing, other_detecting & missing):
                 if VISIBLE in (track.visibility[other_camera], other.visibility[camera]):
-                    return tuple(sorted((camera, other_camera)))
+                    return min(camera, other_camera), max(camera, other_camera)
     return None
 
 
-def _meets(track, former, view):
+def _meets(track: Track, former: State, view: CameraView) -> bool:
     """Whether someone who walks would pass a camera at the height of the body nearer than `NEAREST_M`, and may stand at
     the place of the former State: it is in view, and the depth image does not show that it is empty."""
     if view.depth_at is None or not track.is_moving:
@@ -159,7 +164,7 @@ def _meets(track, former, view):
     return not _is_empty(view, former)
 
 
-def _is_empty(view, place):
+def _is_empty(view: CameraView, place: State) -> bool:
     """Whether most of the rays of an image towards a body at the place of a State, so near that it fills the image or a
     part of it, are measured clearly behind it; also if all of them are outside the image."""
     (distance_m,), (bearing,) = view.bearings(np.array([(place.x, place.y)]))
@@ -177,7 +182,7 @@ def _is_empty(view, place):
     return np.count_nonzero(behind) >= HIDDEN_SHARE * np.count_nonzero(is_inside)
 
 
-def _stop(track, former, share):
+def _stop(track: Track, former: State, share: float) -> None:
     """Return a track to its former State, with a share of the velocity."""
     slow_u, slow_v = track.slow_mps
     track.slow_mps = share * slow_u, share * slow_v
@@ -185,7 +190,7 @@ def _stop(track, former, share):
                         *_bounded(track.state, former, PRESENT_M))
 
 
-def _visibilities(tracks, occluding, image):
+def _visibilities(tracks: Sequence[Track], occluding: Sequence[Track], image: CameraState) -> Visibilities:
     """The visibility {ID: PRESENT, STAYED, VISIBLE, OCCLUDED or OUT_OF_VIEW} of tracks in the view of a CameraState."""
     if not tracks:
         return {}
@@ -194,23 +199,25 @@ def _visibilities(tracks, occluding, image):
     return dict(zip([track.id for track in tracks], visibility.tolist()))
 
 
-def _former_visibilities(tracks, before, occluding, image):
+def _former_visibilities(tracks: Iterable[Track], before: Dict[int, Track], occluding: Sequence[Track],
+                         image: CameraState) -> Visibilities:
     """As `_visibilities`, at the previous positions of the tracks, which do not occlude themselves there."""
     return {track.id: _visibilities([before[track.id]], [other for other in occluding if other.id != track.id],
                                     image)[track.id] for track in tracks}
 
 
-def _bounded(predicted, former, most_m):
+def _bounded(predicted: State, former: State, most_m: float) -> Tuple[float, ...]:
     """The covariance of a predicted State; that of the former one where the position would be less certain than this
     standard deviation."""
     return (former if predicted.position_m2 > most_m ** 2 else predicted)[4:]
 
 
-def _positions_of(tracks):
+def _positions_of(tracks: Iterable[Track]) -> np.ndarray:
     return np.array([(track.state.x, track.state.y, track.z_m) for track in tracks]).reshape(-1, 3)
 
 
-def classify_visibility(view, positions_m, sizes_m, others_m, max_range_m):
+def classify_visibility(view: CameraView, positions_m: np.ndarray, sizes_m: np.ndarray, others_m: np.ndarray,
+                        max_range_m: float) -> np.ndarray:
     """Classify the visibility (n,) of people with centres and extents (n, 3) in a CameraView.
 
     VISIBLE: a detection is expected. OCCLUDED: by a person at one of the centres `others_m` (m, 3), which may contain
@@ -236,7 +243,7 @@ def classify_visibility(view, positions_m, sizes_m, others_m, max_range_m):
     return visibility
 
 
-def depths_towards(camera, depth, points):
+def depths_towards(camera: Camera, depth: DepthImage, points: np.ndarray) -> np.ndarray:
     """Depth measured in the direction of points, for `CameraView.depth_at`.
 
     Parameters
@@ -261,14 +268,16 @@ def depths_towards(camera, depth, points):
     return np.where(inside & measured, depths_m, np.nan)
 
 
-def _out_of_range(view, positions_m, sizes_m, distances_m, max_range_m):
+def _out_of_range(view: CameraView, positions_m: np.ndarray, sizes_m: np.ndarray, distances_m: np.ndarray,
+                  max_range_m: float) -> np.ndarray:
     """People too close to the camera or too far from it, (n,) bool."""
     above_m = np.abs(positions_m[:, 2] - view.fixed_from_camera[2, 3]) - sizes_m[:, 2] / 2
     distances_m = np.hypot(distances_m, np.maximum(above_m, 0))
     return (distances_m < NEAREST_M) | (distances_m > max_range_m)
 
 
-def _shares_in_image(view, positions_m, heights_m, bearings):
+def _shares_in_image(view: CameraView, positions_m: np.ndarray, heights_m: np.ndarray,
+                     bearings: np.ndarray) -> np.ndarray:
     """Share (n,) of the axes of upright bodies inside the part of the image with depth, less a margin of `EDGE_RAD`,
     regardless of occlusion.
 
@@ -291,13 +300,14 @@ def _shares_in_image(view, positions_m, heights_m, bearings):
     return (in_front & inside).sum(axis=1) / len(AXIS_SAMPLES)
 
 
-def _behind_people(distances_m, bearings, others_m, others_bearings):
+def _behind_people(distances_m: np.ndarray, bearings: np.ndarray, others_m: np.ndarray,
+                   others_bearings: np.ndarray) -> np.ndarray:
     apart = np.abs(wrapped(others_bearings - bearings[:, None]))
     covered = apart < _half_widths(others_m) + SEEN_BESIDE * _half_widths(distances_m)[:, None]
     return (covered & (others_m < distances_m[:, None] - NEARER_M)).any(axis=1)
 
 
-def _half_widths(distances_m):
+def _half_widths(distances_m: np.ndarray) -> np.ndarray:
     """Angular half widths of bodies at distances in metres, radians."""
     return np.arcsin(np.minimum(BODY_RADIUS_M / np.maximum(distances_m, 0.01), 1))
 
@@ -315,7 +325,7 @@ class _InDepth(NamedTuple):
     unknown: np.ndarray
 
 
-def _in_depth(view, positions_m, sizes_m):
+def _in_depth(view: CameraView, positions_m: np.ndarray, sizes_m: np.ndarray) -> _InDepth:
     """The _InDepth of people with centres and extents (n, 3)."""
     rotation = view.fixed_from_camera[:3, :3]  # its inverse is its transpose
     centers = (positions_m - view.fixed_from_camera[:3, 3]).dot(rotation)

@@ -1,4 +1,4 @@
-"""Tracks: the state of one object from image to image, and what is published of it.
+"""Tracks: the state of one object from image to image.
 
 The track score is the log odds that a track is an object and not a series of false detections: the sum of the
 log-likelihood ratios of its detections and misses (Sittler 1964; Blackman and Popoli, Design and Analysis of Modern
@@ -9,17 +9,14 @@ rates, the score depends on the time and not on the number of images.
 A track starts with the log odds of its first detection and of an arrival: the number of people who come into view
 between two images grows with the time between them, the number of independent false detections of an image does not.
 """
-import functools
 import math
-from typing import NamedTuple
+from typing import Any, FrozenSet, NamedTuple, Optional
 
-import numpy as np
-
-from ros_3d_bb.core.params import Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking import kalman_filter
 from ros_3d_bb.tracking.appearance import LEAST_SUPPORT, Appearance
-from ros_3d_bb.tracking.types import NOT_DETECTED, OUT_OF_VIEW, VISIBLE, TrackedObject, prediction_times_s
+from ros_3d_bb.tracking.measurement_model import Kind, Kinds, Measurement
+from ros_3d_bb.tracking.types import NOT_DETECTED, OUT_OF_VIEW, VISIBLE, Detection
 
 # All are chosen; `./run bench tracking` and `./run bench scenes` show the effect of others.
 HIT_CORRELATION_S = 0.08  # without scores, three images at 30 Hz or two independent ones confirm a track by default
@@ -32,65 +29,16 @@ UNKNOWN_SCORE, LARGEST_SCORE = 0.5, 0.9999  # assumed if the score is unknown; u
 # Of the score of a detection. A high score does not mean that the position is right, as of a person half hidden.
 MAX_LOG_ODDS = 1.1
 HIT = 0.8  # of a detection where a track is expected: little, because false detections repeat at their place, too
-KNOWN_IMAGES = 4  # images that the expected rate of detections counts for, against the observed rate of a new track
 MAX_TRACK_SCORE = 4.0  # earlier evidence is forgotten: an undetected person is published for 0.4 s
 MIN_TRACK_SCORE = -2.0  # with less (12 % probability), tracks do not start, and undetected tracks are not published
 SMOOTHING = 0.1  # weight of the newest detection in size, height and score
-SMOOTHED_HITS = 10  # number of detections from which on their mean has this weight
-CUT_SMOOTHING = 0.02  # the same for boxes that the image border truncates sideways: the head may be outside
 LEGS_M = 0.2  # a lower end that is this much higher does not show the legs; chosen: heights of people differ by less
-CUT_LASTS_NS = NS // 2  # hysteresis: an end is visible again this long after it was last truncated
 LEAST_HEIGHT_M = 0.1
 STILL_MOVING = 0.5  # hysteresis: a moving track stops below this share of `moving_speed`
-NEVER_NS = -10 ** 18
+SLOW_S = 0.3  # time constant of the slow velocity, from which the velocity differs in manoeuvres; see `prediction`
 # Visibility of a detected track, and of one that is not detected, but whose place is occupied in the depth image:
 # STAYED if by something that is farther than the axis of the body. They rank before VISIBLE, OCCLUDED and OUT_OF_VIEW.
 SEEN, PRESENT, STAYED = -3, -2, -1
-LEAST_SPEED2 = 1e-12  # avoids a division by zero
-# Prediction. Chosen for recorded pedestrians by kind of motion; `./run bench prediction` shows the effect of others.
-SLOW_S = 0.3  # time constant of the slow velocity, from which the velocity differs in manoeuvres
-SLOW_SHARE = 0.4  # of the slow velocity in that of the prediction: people sway as they walk
-MANOEUVRE = 2.0  # squared ratio of this difference to the standard deviation at which a manoeuvre has the weight 1/2
-# People who walk accelerate less than those who start: density relative to that at rest, and the squared speed at which
-# it is halfway between.
-WALKING_SHARE, WALKING_M2PS2 = 1 / 3.0, 0.36
-# Places among the numbers of a published track, see `_numbers_of`: of x, y, z, their velocities, the velocity of the
-# prediction, the extents, and the share of `manoeuvre_acceleration`; of the covariance of the first six, and of the two
-# terms of the covariances of x, y, z that are multiplied by the powers 0, 1, 2 of the time of a prediction.
-POSITION, VELOCITY, EXPECTED, SIZE, MANOEUVRING = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), 12
-XX, XY, XU, XV, YY, YU, YV, UU, UV, VV, ZZ = range(13, 24)
-ZERO = 5  # the vertical velocity
-COVARIANCE = np.array([[XX, XY, ZERO, XU, XV, ZERO], [XY, YY, ZERO, YU, YV, ZERO], [ZERO, ZERO, ZZ, ZERO, ZERO, ZERO],
-                       [XU, YU, ZERO, UU, UV, ZERO], [XV, YV, ZERO, UV, VV, ZERO], [ZERO] * 6])
-_CROSS, _NOTHING = COVARIANCE[:3, 3:], np.full((3, 3), ZERO)
-AHEAD = COVARIANCE[:3, :3], _CROSS, COVARIANCE[3:, 3:], _NOTHING, _CROSS.T, _NOTHING
-COVARIANCES = np.concatenate([COVARIANCE.ravel()] + [each.ravel() for each in AHEAD])  # at once, as indexing is slow
-LEVEL = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])  # a covariance (3, 3) of 1 along x and y
-
-
-@parameters('predictions')
-class PredictionParams(NamedTuple):
-    """Parameters of the prediction of tracks."""
-
-    prediction_time: float = Param(2.0, 'How far ahead positions are predicted; 2 in the thesis.', 's', live=(0, 10))
-    prediction_step: float = Param(0.25, 'Time between predicted positions.', 's', live=(0.05, 1))
-    prediction_acceleration: float = Param(
-        0.02, 'How much more people turn than the filter models: density of a white acceleration.', 'm^2/s^3',
-        live=(0, 1))
-    manoeuvre_acceleration: float = Param(
-        0.45, 'Additional density of a white acceleration of people who start. People who stop or turn while they walk '
-        'have a third of it.',
-        'm^2/s^3', live=(0, 2))
-    standing_speed: float = Param(
-        0.15, 'A velocity much lower than this is not extrapolated: it is mostly noise.', 'm/s', live=(0, 1))
-    position_bias: float = Param(
-        0.05, 'Standard deviation added for errors that stay the same for seconds.', 'm', live=(0, 0.5))
-    pose_sigma: float = Param(
-        0.0, 'Standard deviation of the position of the robot in the frame of the tracks, along each axis, such as the '
-        'error of its localisation. It is added to the covariances.', 'm', live=(0, 1))
-    pose_yaw_sigma: float = Param(
-        0.0, 'Standard deviation of the heading of the robot in the frame of the tracks. It is added to the '
-        'covariances.', 'rad', live=(0, 0.5))
 
 
 class Rules(NamedTuple):
@@ -100,25 +48,13 @@ class Rules(NamedTuple):
     even_log_odds: float
     confirming_log_odds: float
     moving_speed: float
-    kinds: dict
+    kinds: Kinds
 
     @classmethod
-    def of(cls, params, kinds):
+    def of(cls, params: Any, kinds: Kinds) -> 'Rules':
         """The Rules of TrackerParams."""
         return cls(kalman_filter.outlier_model(params), _logit(params.even_score),
                    _logit(params.confirmation_probability), params.moving_speed, kinds)
-
-
-class _End(NamedTuple):
-    """Lower or upper end of a body: number of the detections that show it, and stamp of the latest that is truncated.
-    """
-
-    hits: int
-    cut_ns: int
-
-    def was_cut(self, stamp_ns):
-        """Whether this end was truncated within `CUT_LASTS_NS` before a stamp."""
-        return stamp_ns - self.cut_ns < CUT_LASTS_NS
 
 
 class LatestBox(NamedTuple):
@@ -131,7 +67,7 @@ class LatestBox(NamedTuple):
     is_nearer: bool
 
     @classmethod
-    def of(cls, measurement):
+    def of(cls, measurement: Measurement) -> 'LatestBox':
         """The LatestBox of a Measurement."""
         return cls(measurement.x, measurement.y, measurement.z + measurement.size_m[2] / 2, measurement.is_nearer)
 
@@ -140,19 +76,20 @@ class Track(object):
     """One object. Plain numbers in the fixed frame, metres, nanoseconds.
 
     `state` is a `kalman_filter.State`. `z_m` is the height of the centre and `z_m2` its variance; `size_m` are the
-    extents, and `lower` and `upper` the ends of the body. `hits` counts the detections, of which `first_ns` and
-    `last_ns` are the first and the latest. `unseen_s` is the time since the latest one, `missed_s` the part of it
-    during which a detection was expected. `visibility` is that in the latest image of each camera: SEEN, PRESENT,
-    STAYED, or as `status`; since the stamps `since_ns`. `latest` is the `LatestBox`, `misses` counts the images before
-    the confirmation in which a detection was expected. `log_odds` is the track score. `kind` is the class of the group
-    that has the most of the filtered scores `votes`; `score` is the filtered score of the detections, `detection` the
-    `Detection.index` in the latest image. `innovation_m` is that of the latest image if its noise is assumed, otherwise
-    0. `slow_mps` is the velocity, filtered over `SLOW_S`. `misplaced` are the log odds that outliers have moved this
-    track. `is_moving` is whether it moved at the latest detection. `appearance` is the `Appearance`, None if unknown,
-    and `met` are the IDs of the tracks that were detected in an image together with this one.
+    extents; `lower_hits` and `upper_hits` count the detections that show the ends of the body. `hits` counts the
+    detections, of which `first_ns` and `last_ns` are the first and the latest. `unseen_s` is the time since the latest
+    one, `missed_s` the part of it during which a detection was expected. `visibility` is that in the latest image of
+    each camera: SEEN, PRESENT, STAYED, or as `status`; since the stamps `since_ns`. `latest` is the `LatestBox`,
+    `log_odds` is the track score. `kind` is the class of the group that has the most of the filtered scores `votes`;
+    `score` is the filtered score of the detections, `detection` the `Detection.index` in the latest image.
+    `innovation_m` is that of the latest image if its noise is assumed, otherwise 0. `slow_mps` is the velocity,
+    filtered over `SLOW_S`. `misplaced` are the log odds that outliers have moved this track. `is_moving` is whether it
+    moved at the latest detection. `appearance` is the `Appearance`, None if unknown, and `met` are the IDs of the
+    tracks that were detected in an image together with this one.
     """
 
-    def __init__(self, track_id, measurement, stamp_ns, camera, speed_mps, log_odds):
+    def __init__(self, track_id: int, measurement: Measurement, stamp_ns: int, camera: str, speed_mps: float,
+                 log_odds: float) -> None:
         """Start a track with a track score; the velocity is unknown, with the standard deviation `speed_mps` along each
         axis.
         """
@@ -162,18 +99,19 @@ class Track(object):
                                          0.0, measurement.yy, 0.0, 0.0, speed_m2, 0.0, speed_m2)
         self.z_m, self.z_m2, self.size_m = measurement.z, measurement.zz, measurement.size_m
         _left, top, _right, bottom = detection.truncated_edges
-        self.lower, self.upper = (_End(0, stamp_ns) if is_cut else _End(1, NEVER_NS) for is_cut in (bottom, top))
-        self.latest, self.misses = LatestBox.of(measurement), 0
+        self.lower_hits, self.upper_hits = int(not bottom), int(not top)
+        self.latest = LatestBox.of(measurement)
         self.hits, self.first_ns, self.last_ns, self.unseen_s, self.missed_s = 1, stamp_ns, stamp_ns, 0.0, 0.0
         self.status, self.innovation_m = VISIBLE, (0.0, 0.0)
         self.visibility, self.since_ns = {camera: SEEN}, {camera: stamp_ns}
         self.slow_mps, self.misplaced = (0.0, 0.0), 0.0
         self.log_odds, self.is_confirmed, self.is_moving = log_odds, False, False
         self.votes = {measurement.kind.label: _vote(detection.score)}
-        self.appearance, self.met = None, frozenset()
+        self.appearance: Optional[Appearance] = None
+        self.met: FrozenSet[int] = frozenset()
         self._update_appearance(detection)
 
-    def predicted(self, elapsed_s, acceleration):
+    def predicted(self, elapsed_s: float, acceleration: float) -> 'Track':
         """A copy of this track `elapsed_s` later, not detected, given the acceleration density of people."""
         track = Track.__new__(Track)
         track.__dict__.update(self.__dict__)
@@ -181,13 +119,13 @@ class Track(object):
         track.detection = NOT_DETECTED
         return track
 
-    def set_visibility(self, camera, visibility, stamp_ns):
+    def set_visibility(self, camera: str, visibility: int, stamp_ns: int) -> None:
         """Set the visibility in the latest image of a camera. Copies of this track keep the previous one."""
         if self.visibility.get(camera) != visibility:
             self.visibility, self.since_ns = dict(self.visibility), dict(self.since_ns)
             self.visibility[camera], self.since_ns[camera] = visibility, stamp_ns
 
-    def update(self, measurement, stamp_ns, camera, rules):
+    def update(self, measurement: Measurement, stamp_ns: int, camera: str, rules: Rules) -> None:
         """Update this track, predicted to the stamp, with its measurement in the image of a camera."""
         self.set_visibility(camera, SEEN, stamp_ns)
         elapsed_s = (stamp_ns - self.last_ns) / NS
@@ -210,11 +148,12 @@ class Track(object):
         self.status, self.detection = VISIBLE, detection.index
         limit_mps = rules.moving_speed * (STILL_MOVING if self.is_moving else 1)
         self.is_moving = math.hypot(state.u, state.v) >= limit_mps
-        self._update_size(measurement, stamp_ns)
+        self._update_size(measurement)
         self._update_class(measurement.kind, detection.score, rules.kinds)
         self._update_appearance(detection)
 
-    def _in_place(self, measurement, latest, period_s, outliers):
+    def _in_place(self, measurement: Measurement, latest: LatestBox, period_s: float,
+                  outliers: kalman_filter.OutlierModel) -> Measurement:
         """Resolve a measurement that is nearer than this track by the offset of outliers. Returns the one to use.
 
         If outliers have probably moved this track, it is moved back. Otherwise the box is wrong, and the measurement is
@@ -238,54 +177,46 @@ class Track(object):
         self.misplaced, self.latest = LEAST_MISPLACED, self.latest._replace(is_nearer=False)
         return measurement
 
-    def miss(self, status, unseen_s, missed_s, detection_probability):
+    def miss(self, status: int, unseen_s: float, missed_s: float, detection_probability: float) -> None:
         """Mark this track as not detected for `unseen_s` and not detected where a camera should for `missed_s`."""
         self.status, self.unseen_s, self.missed_s = status, self.unseen_s + unseen_s, self.missed_s + missed_s
-        if not self.is_confirmed and missed_s:
-            # Some people are detected in half of the images only, but again and again at the same place: the mean of
-            # the expected rate, which counts as `KNOWN_IMAGES`, and of the observed one.
-            self.misses += 1
-            detection_probability *= (self.hits + KNOWN_IMAGES) / (self.hits + self.misses + KNOWN_IMAGES)
         self.log_odds += min(missed_s / MISS_CORRELATION_S, 1) * math.log(1 - detection_probability)
         self.innovation_m = 0.0, 0.0
 
-    def _update_size(self, measurement, stamp_ns):
-        """Smooth the extents and the height.
+    def _update_size(self, measurement: Measurement) -> None:
+        """Smooth the extents and the height, unless the box shows only a part of the width, whose ends may be others.
 
-        The lower and the upper end are smoothed separately. A truncated end moves with the other one, so that the
-        height stays constant. An end that has never been visible is placed where the estimator expects it. Detectors
-        place the edge of a truncated person on either side of the limit of truncation, so an end stays truncated for
-        `CUT_LASTS_NS`.
+        The lower and the upper end are smoothed separately. An end that is truncated moves with the other one, so that
+        the height stays constant, as does a lower end that is hidden: much higher than before, below the same head. An
+        end that has never been visible is placed where the estimator expects it.
         """
-        cut_left, top, cut_right, bottom = measurement.detection.truncated_edges
-        self.lower, is_lower_held = _end_after(self.lower, bottom, stamp_ns)
-        self.upper, is_upper_held = _end_after(self.upper, top, stamp_ns)
-        share, largest = max(SMOOTHING, 1 / self.hits), 1.0
-        if cut_left or cut_right:
-            share = largest = CUT_SMOOTHING
-        lower_share = 0.0 if is_lower_held else min(max(SMOOTHING, 1 / (self.lower.hits or self.hits)), largest)
-        upper_share = 0.0 if is_upper_held else min(max(SMOOTHING, 1 / (self.upper.hits or self.hits)), largest)
+        is_left_cut, is_top_cut, is_right_cut, is_bottom_cut = measurement.detection.truncated_edges
+        if is_left_cut or is_right_cut:
+            return
         (width_m, depth_m, height_m), (new_width_m, new_depth_m, new_height_m) = self.size_m, measurement.size_m
         up_m, taller_m = measurement.z - self.z_m, new_height_m - height_m
-        lower_up_m, upper_up_m = up_m - taller_m / 2, up_m + taller_m / 2
-        if not is_lower_held and self.lower.hits > 1 and abs(upper_up_m) < LEGS_M < lower_up_m:
-            lower_share = CUT_SMOOTHING
-        lower_m, upper_m = lower_share * lower_up_m, upper_share * upper_up_m
-        if is_lower_held:
+        lower_m, upper_m = up_m - taller_m / 2, up_m + taller_m / 2
+        is_hidden = is_bottom_cut or abs(upper_m) < LEGS_M < lower_m
+        self.lower_hits, self.upper_hits = self.lower_hits + (not is_hidden), self.upper_hits + (not is_top_cut)
+        share = max(SMOOTHING, 1 / self.hits)
+        lower_share = max(SMOOTHING, 1 / (self.lower_hits or self.hits))
+        upper_share = max(SMOOTHING, 1 / (self.upper_hits or self.hits))
+        lower_m, upper_m = lower_share * lower_m, upper_share * upper_m
+        if is_hidden and (self.lower_hits or not is_bottom_cut):
             lower_m = upper_m
-        if is_upper_held:
+        if is_top_cut and self.upper_hits:
             upper_m = lower_m
         self.size_m = (width_m + share * (new_width_m - width_m), depth_m + share * (new_depth_m - depth_m),
                        max(height_m + upper_m - lower_m, LEAST_HEIGHT_M))
         self.z_m += (lower_m + upper_m) / 2
         self.z_m2 += (lower_share + upper_share) / 2 * (measurement.zz - self.z_m2)
 
-    def _update_appearance(self, detection):
+    def _update_appearance(self, detection: Detection) -> None:
         """Average the colours of the clothes."""
         if detection.appearance is not None and detection.support >= LEAST_SUPPORT:
             self.appearance = (self.appearance or Appearance()).updated(detection.appearance)
 
-    def _update_class(self, kind, score, kinds):
+    def _update_class(self, kind: Kind, score: float, kinds: Kinds) -> None:
         """Filter the score, and those of the classes of the group: the mean of the first detections, then a first-order
         filter. Unknown scores leave the score as it is.
         """
@@ -298,22 +229,12 @@ class Track(object):
             self.votes, self.kind = votes, kinds[max(kind.members, key=lambda label: votes.get(label, 0.0))]
 
 
-def _end_after(end, is_cut, stamp_ns):
-    """The _End after a detection, and whether it moves with the other one."""
-    if not is_cut and end.hits >= SMOOTHED_HITS and not end.was_cut(stamp_ns):
-        return end, False  # further detections make no difference
-    cut_ns = stamp_ns if is_cut else end.cut_ns
-    was_cut = not is_cut and end.was_cut(stamp_ns)
-    hits = end.hits + (not is_cut and not was_cut)
-    return _End(hits, cut_ns), was_cut or is_cut and hits > 0
-
-
-def _vote(score):
+def _vote(score: float) -> float:
     """Weight of a detection for the class of its track: its score, 1 if unknown."""
     return score if score > 0 else 1.0
 
 
-def log_odds_of(score, even_log_odds):
+def log_odds_of(score: float, even_log_odds: float) -> float:
     """Log odds that a detection shows an object: its score is 0..1, 0 if unknown; half of the detections with the score
     of the log odds `even_log_odds` do.
     """
@@ -321,7 +242,7 @@ def log_odds_of(score, even_log_odds):
     return min(log_odds, MAX_LOG_ODDS)
 
 
-def log_odds_of_arrival(period_s):
+def log_odds_of_arrival(period_s: Optional[float]) -> float:
     """Log odds that a new detection shows a person who has come into view in the time `period_s` since the previous
     image of the camera, None for its first one, relative to those after `HIT_CORRELATION_S`. After less, new false
     detections are rarer, too, as those of the previous image repeat.
@@ -330,78 +251,5 @@ def log_odds_of_arrival(period_s):
     return math.log(arrival_s / HIT_CORRELATION_S)
 
 
-def _logit(probability):
+def _logit(probability: float) -> float:
     return math.log(probability / (1 - probability))
-
-
-def learned_prediction(log_scale, assumed_m, params):
-    """Adapt PredictionParams to the learned scale of the variance `assumed_m`².
-
-    If the scale is below 1, the rest of the variance is that of lasting errors, and slow velocities are less noisy.
-    """
-    if log_scale >= 0:
-        return params
-    scale = math.exp(log_scale)
-    lasting_m = math.sqrt(max(params.position_bias ** 2, assumed_m ** 2 * (1 - scale)))
-    return params._replace(position_bias=lasting_m, standing_speed=params.standing_speed * math.sqrt(scale))
-
-
-def published(tracks, params, moving_speed, camera_m):
-    """Convert tracks to a list of TrackedObject with predictions at constant velocity; `params` are PredictionParams.
-
-    A track that was moving when it was last detected may have been stopped since, see `occlusion.mark_missed`.
-
-    People sway as they walk. The predicted velocity v is therefore between that of the filter and the slow one. A low
-    velocity is mostly noise of a standing person, so v is scaled by v² / (v² + standing_speed²). The covariance of the
-    filter does not include errors that stay constant for seconds, such as those of a wrong calibration; `position_bias`
-    is added for them, and the error of the robot's pose: `pose_sigma`, and `pose_yaw_sigma` about the position (2,) of
-    the camera, `camera_m`. A prediction is a mixture of two Gaussians with the same mean: the person goes on, with
-    `prediction_acceleration`, or is in a manoeuvre, with `manoeuvre_acceleration` in addition. The covariance is that
-    of the mixture.
-    """
-    if not tracks:
-        return []
-    numbers = np.array([_numbers_of(track, params.standing_speed ** 2 + LEAST_SPEED2) for track in tracks])
-    numbers[:, [XX, YY]] += params.position_bias ** 2 + params.pose_sigma ** 2
-    across = (numbers[:, :2] - camera_m)[:, ::-1] * (-params.pose_yaw_sigma, params.pose_yaw_sigma)
-    numbers[:, [XX, XY, YY]] += across[:, (0, 0, 1)] * across[:, (0, 1, 1)]
-    times_s, powers, spread = _times(params.prediction_time, params.prediction_step)
-    densities = params.prediction_acceleration + params.manoeuvre_acceleration * numbers[:, MANOEUVRING]
-    positions_m, velocities_mps, sizes_m = numbers[:, POSITION], numbers[:, VELOCITY], numbers[:, SIZE]
-    predictions_m = positions_m[:, None] + times_s[:, None] * numbers[:, None, EXPECTED]
-    covariances = numbers.take(COVARIANCES, axis=1)
-    ahead = (covariances[:, 36:63] + covariances[:, 63:]).reshape(-1, 3, 9)
-    predictions_m2 = powers @ ahead + densities[:, None, None] * spread
-    return [TrackedObject(track.id, position_m, size_m, velocity_mps, velocity_mps, track.status,
-                          track.is_moving and math.hypot(track.state.u, track.state.v) >= STILL_MOVING * moving_speed,
-                          track.first_ns, track.last_ns, prediction_m, params.prediction_step, covariance,
-                          prediction_m2, track.kind.label, track.score, track.detection)
-            for track, position_m, size_m, velocity_mps, prediction_m, covariance, prediction_m2
-            in zip(tracks, positions_m, sizes_m, velocities_mps, predictions_m,
-                   covariances[:, :36].reshape(-1, 6, 6),
-                   predictions_m2.reshape(len(tracks), -1, 3, 3))]
-
-
-def _numbers_of(track, standing2):
-    """The numbers of a track that are published, in the order of `POSITION` and the others below it.
-
-    A person is in a manoeuvre if the velocity differs from the slow one by more than its covariance explains.
-    """
-    state, (slow_u, slow_v) = track.state, track.slow_mps
-    change_u, change_v = slow_u - state.u, slow_v - state.v
-    u, v = state.u + SLOW_SHARE * change_u, state.v + SLOW_SHARE * change_v
-    speed2, change2 = u * u + v * v, change_u ** 2 + change_v ** 2
-    share = speed2 / (speed2 + standing2)
-    manoeuvring = change2 / (change2 + MANOEUVRE * (state.uu + state.vv) / 2 + LEAST_SPEED2)  # its probability
-    manoeuvring *= WALKING_SHARE + (1 - WALKING_SHARE) * WALKING_M2PS2 / (WALKING_M2PS2 + speed2)
-    x, y, vx, vy, *variances = state
-    return (x, y, track.z_m, vx, vy, 0.0, share * u, share * v, 0.0, *track.size_m, manoeuvring, *variances, track.z_m2)
-
-
-@functools.lru_cache(maxsize=16)
-def _times(time_s, step_s):
-    """Times of the predictions (steps,), their powers 0 to 2 (steps, 3), and the variances (steps, 9) that a white
-    acceleration of density 1 adds.
-    """
-    times_s = prediction_times_s(time_s, step_s)
-    return (times_s, np.stack((times_s ** 0, times_s, times_s ** 2), axis=1), (times_s ** 3 / 3)[:, None] * LEVEL)

@@ -23,8 +23,8 @@ from ros_3d_bb.tracking.measurement_model import (BOX_ERRORS, DEFAULT_RANGE_M, B
                                                   measurements_of, scaled)
 from ros_3d_bb.tracking.occlusion import CameraState, contradicting_cameras, mark_missed
 from ros_3d_bb.tracking.out_of_sequence import DetectedImage, Match, OutOfSequenceBuffer
-from ros_3d_bb.tracking.track import (MIN_TRACK_SCORE, PredictionParams, Rules, Track, learned_prediction,
-                                      published)
+from ros_3d_bb.tracking.prediction import PredictionParams, learned_prediction, published
+from ros_3d_bb.tracking.track import MIN_TRACK_SCORE, Rules, Track
 from ros_3d_bb.tracking.types import VISIBLE, CameraView, Detection, TrackedObject, check_steps
 
 KNOWN_NS = 60 * NS  # a camera without images for longer than this, while others send images, counts as new; chosen
@@ -102,6 +102,22 @@ class Tracker(object):
     ------
     ValueError
         If a parameter is invalid; the message names it.
+
+    Examples
+    --------
+    A person walks along y at 1 m/s, 4 m in front of a camera at the origin that looks along x:
+
+    >>> import numpy as np
+    >>> from ros_3d_bb.tracking.types import CameraView, Detection
+    >>> view = CameraView(np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1], [0, 0, 0, 1]], float))
+    >>> tracker = Tracker()
+    >>> for image in range(31):
+    ...     person = Detection(position_m=(4, image / 30, 0.9), size_m=(0.5, 0.5, 1.8), score=0.9)
+    ...     tracks = tracker.update(stamp_ns=image * NS // 30, detections=[person], view=view)
+    >>> [(track.id, track.position_m.round(1).tolist(), track.velocity_mps.round(1).tolist()) for track in tracks]
+    [(1, [4.0, 1.0, 0.9], [0.0, 1.0, 0.0])]
+    >>> tracks[0].prediction_m[-1].round(1).tolist()  # after 2 s
+    [4.0, 2.9, 0.9]
     """
 
     def __init__(self, params: TrackerParams = TrackerParams(), noise: NoiseParams = NoiseParams(),

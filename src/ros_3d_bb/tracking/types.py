@@ -4,7 +4,7 @@ from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tu
 
 import numpy as np
 
-from ros_3d_bb.camera.camera_model import Camera, transform_points
+from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.camera.images import quarter_turns
 from ros_3d_bb.core.object_classes import PERSON, ObjectClasses
 
@@ -33,7 +33,7 @@ class Detection(NamedTuple):
     support: float = 1.0
     label: str = PERSON
     score: float = 0.0
-    index: int = NOT_DETECTED
+    index: int = NOT_DETECTED  # type: ignore[assignment]  # tuple.index is never used
     appearance: Optional[Tuple[float, ...]] = None
     is_ignored: bool = False
 
@@ -81,9 +81,9 @@ class CameraView(NamedTuple):
     """
 
     fixed_from_camera: np.ndarray
-    intrinsics: Optional[Camera] = None
+    intrinsics: Any = None  # Camera or None
     camera: str = ''
-    depth_at: Optional[Callable[[np.ndarray], np.ndarray]] = None
+    depth_at: Any = None  # Callable[[np.ndarray], np.ndarray] or None
     measured_area: Optional[Callable[[], Tuple[int, int, int, int]]] = None
 
     @property

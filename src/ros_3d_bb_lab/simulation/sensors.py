@@ -3,8 +3,8 @@
 The depth camera matches the images of two imagers. It measures the disparity d = f B / z in steps of 1/32 px, so depth
 has levels C / n with integer n. The noise of disparity is constant, so that of depth grows with the square of the
 distance. Surfaces that the second imager does not see have no depth; they form a shadow to the left of near objects.
-All parameters were fitted to the images of the thesis (compared in `test/unit/test_stereo.py`). Their depth is aligned
-to the colour camera, and so is the output of this model.
+All parameters were fitted to the images of the thesis (compared in `test/unit/test_simulator.py`). Their depth is
+aligned to the colour camera, and so is the output of this model.
 
 Convention: inverse depth is 1/z in the camera's optical frame, 1/m; depth images are 16UC1, millimetres, 0 = no depth.
 """

@@ -156,9 +156,6 @@ class Simulator(object):
         return Poses(state.map_from_odom, np.linalg.inv(state.map_from_odom).dot(map_from_base),
                      base_from_mount.dot(tilted).dot(FRONT_FROM_OPTICAL))
 
-    def poses_at(self, time_s, camera_index=0):
-        return self.poses(self.state_at(time_s), camera_index)
-
     def positions_at(self, time_s):
         """Positions (n, 2) of people and objects in the map by their moves. The time may be after the end of the scene.
         """

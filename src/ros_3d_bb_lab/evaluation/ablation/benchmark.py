@@ -92,9 +92,9 @@ MECHANISMS = tuple(Mechanism(*row) for row in (
     ('missed detections', 'tracking.tracker', 'detection_log_odds_of', lambda tracks, *_: [0.0] * len(tracks)),
     ('recent tracks first', 'tracking.association', 'RECENT_NS', 10 ** 18),
     ('outliers that follow each other', 'tracking.track', 'OUTLIER_CORRELATION_S', 1e-9),
-    ('slow velocity', 'tracking.track', 'SLOW_SHARE', 0.0),
-    ('manoeuvres in predictions', 'tracking.track', 'PredictionParams.manoeuvre_acceleration', 0.0),
-    ('standing in predictions', 'tracking.track', 'PredictionParams.standing_speed', 0.0),
+    ('slow velocity', 'tracking.prediction', 'SLOW_SHARE', 0.0),
+    ('manoeuvres in predictions', 'tracking.prediction', 'PredictionParams.manoeuvre_acceleration', 0.0),
+    ('standing in predictions', 'tracking.prediction', 'PredictionParams.standing_speed', 0.0),
     ('scores of boxes', 'tracking.association', 'log_odds_of_arrival', lambda _probability: 0.0),
     ('correlated misses', 'tracking.track', 'MISS_CORRELATION_S', 1e-9)))
 

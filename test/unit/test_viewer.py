@@ -1,11 +1,47 @@
 import itertools
 
+import numpy as np
 import pytest
-from hypothesis import given, strategies as st
 
+from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.time_sync import NS
+from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.sessions.burst import Burst
-from ros_3d_bb.sessions.snapshots import Snapshots
+from ros_3d_bb.sessions.snapshots import ColorImage, Snapshot, Snapshots
+from ros_3d_bb.visualization.cv_window import character_of
+from ros_3d_bb.visualization.image_overlay import colorize_depth
+from ros_3d_bb.visualization.viewer_layout import compose
+
+BOX = Box3D(np.array([0.5, -0.25, 2.0]), np.array([0.5, 1.75, 0.5]), (100, 40, 200, 160), 0.75,
+            (True,) * 4)
+
+
+def view(**changes):
+    snapshot = Snapshot(0, ColorImage(np.full((240, 320, 3), (10, 20, 30), np.uint8), 'optical'),
+                        DepthImage(np.full((240, 320), 1500, np.uint16), 0.001), None, ((100, 40, 200, 160),), (BOX,))
+    return snapshot._replace(**changes)
+
+
+@pytest.mark.parametrize('width_px', [160, 320, 640])
+def test_three_panels_are_side_by_side(width_px):
+    picture = compose(view(), width_px, 6.0)
+    height_px = width_px * 3 // 4
+    assert picture.dtype == np.uint8 and picture.shape[1] == 3 * width_px and picture.shape[0] > height_px
+    row, column = int(height_px * 0.95), int(width_px * 0.5)
+    assert picture[row, column].tolist() == picture[row, column + 2 * width_px].tolist() == [10, 20, 30]
+    depth = colorize_depth(np.full((1, 1), 255 - int(254 * 1.5 / 6.0), np.uint8))[0, 0].astype(int)
+    assert np.abs(picture[row, column + width_px] - depth).max() <= 8
+
+
+WITH_SHIFT = 1 << 16  # GTK's state of modifiers
+
+
+@pytest.mark.parametrize('code, character', [
+    (ord('a'), 'a'), (ord('A') | WITH_SHIFT, 'A'), (0xf6, 'ö'), (0xd6 - 256, 'ö'), (0xff08, '\b'), (0xff8d, '\r'),
+    (0xffb7, '7'), (27, '\x1b')])
+def test_keys_with_a_character_give_it(code, character):
+    assert character_of(code) == character
+
 
 MS = NS // 1000
 PERIOD = 33 * MS
@@ -32,26 +68,6 @@ def test_parts_are_combined_in_any_order(order):
     assert snapshots.newest is None
     send(snapshots, 7, order)
     assert snapshots.newest[:6] == (7 * PERIOD, 7, 7, 7, 7, 7)
-
-
-def test_3d_boxes_have_the_stamp_of_the_depth_image():
-    snapshots, depth_ns = made(), 7 * PERIOD + 4 * MS
-    send(snapshots, 7, ('color', 'camera', 'boxes2d'))
-    snapshots.add_depth(depth_ns, 0, 'depth')
-    snapshots.add_boxes3d(depth_ns, 0, 'boxes3d')
-    assert snapshots.newest[:6] == (7 * PERIOD, 7, 'depth', 7, 7, 'boxes3d')
-
-
-@given(st.integers(0, 29), st.integers(0, 5))
-def test_the_newest_complete_snapshot_is_kept_while_the_detector_works(delay_2d, more_delay_3d):
-    delay_3d = min(29, delay_2d + more_delay_3d)
-    snapshots = made()
-    for number in range(60):
-        send(snapshots, number, PARTS[:3])
-        for part, delay in (('boxes2d', delay_2d), ('boxes3d', delay_3d)):
-            if number >= delay:
-                send(snapshots, number - delay, [part])
-    assert parts_of(snapshots.newest) == (59 - delay_3d,) * 5
 
 
 def test_the_newest_images_are_returned_without_boxes_that_are_late():
@@ -87,12 +103,3 @@ def test_a_burst_follows_a_countdown():
             assert burst.text(tenth / 10) == '%d/3' % len(stored_s)
             burst.report(tenth / 10, True)
     assert stored_s == [5.0, 6.0, 7.0] and not burst.is_active and burst.text(20.0) == ''
-
-
-def test_a_burst_can_be_cancelled_and_started_again():
-    burst = Burst(5.0, 3, 1.0)
-    burst.toggle(0.0)
-    burst.toggle(2.0)
-    assert not burst.is_due(6.0)
-    burst.toggle(10.0)
-    assert burst.is_due(15.0)
