@@ -18,18 +18,7 @@ with open(os.path.join(ROOT, 'package.xml'), encoding='utf-8') as _stream:
 root_doc, CONTENTS = 'README', 'doc/index'
 source_suffix = {'.md': 'markdown', '.rst': 'restructuredtext'}
 include_patterns = ['*.md', 'CHANGELOG.rst', '.github/SUPPORT.md', 'doc/**', 'config/**']
-# Words for the search that are not on the page; it ignores numbers.
-KEYWORDS = {
-    'doc/bags': 'faster', 'doc/benchmarks': 'performance precision fps', 'doc/cameras': 'multiple multi-camera',
-    'doc/campaign': 'calibration calibrate', 'doc/detectors': 'license pedestrian CUDA Jetson',
-    'doc/frames_and_time': 'localization synchronized timestamp', 'doc/installing': 'uninstall',
-    'doc/jackal': 'Husky Clearpath autostart systemd wifi', 'doc/licences': 'license licensing',
-    'doc/other_cameras': 'synchronized', 'doc/planners': 'avoidance collision human-aware lidar',
-    'doc/questions': 'region zone mask furniture follow alternatives humble ROS2 reset', 'doc/realsense': 'L515',
-    'doc/robot': 'color slow performance', 'doc/security': 'privacy GDPR',
-    'doc/topics': 'API interface subscriber cpp roscpp horizon trajectory', 'doc/tracking': 'SORT neighbor',
-    'doc/troubleshooting': 'drift false positives', 'doc/tuning': 'settings'}
-FOLDERS = {'msg': 'doc/messages.md', 'config': 'doc/nodes/index.md'}
+FOLDERS = {'config': 'doc/nodes/index.md'}
 extensions = ['myst_parser']
 myst_enable_extensions = ['dollarmath']
 highlight_language = 'none'
@@ -57,7 +46,6 @@ def _navigation():
     names = set(os.path.splitext(name)[0] for name in os.listdir(os.path.join(ROOT, 'doc', 'nodes'))) - {'index'}
     captions.append(('Nodes', [('All nodes', 'nodes/index.md')] + [
         (name, 'nodes/%s.md' % name) for name in sorted(names)]))
-    captions.append(('Interfaces', [('Launch files', 'launch_files.md'), ('Messages', 'messages.md')]))
     return [(caption, ['%s </%s>' % (text, os.path.splitext(os.path.normpath(os.path.join('doc', path)))[0])
                        for text, path in links]) for caption, links in captions]
 
@@ -77,9 +65,6 @@ def _prepare(_app, name, source):
     if name == root_doc:
         for caption, pages in _navigation():
             source[0] += '\n```{toctree}\n:hidden:\n:caption: %s\n\n%s\n```\n' % (caption, '\n'.join(pages))
-    if name in KEYWORDS:
-        source[0] = '---\nmyst:\n  html_meta:\n    keywords: %s\n---\n%s' % (
-            ', '.join(KEYWORDS[name].split()), source[0])
 
 
 def _write_first_page(app, _exception):

@@ -1,4 +1,4 @@
-"""Pages of nodes, launch files and messages, and the files in config/, from the code.
+"""Pages of nodes, and the files in config/, from the code.
 
 `./run doc` writes the pages into a copy of the checkout, `./run config` the files in config/. Sources are the
 docstrings of a node's class and of the classes in ros_3d_bb.nodes that it uses, the tables of its parameters
@@ -40,7 +40,7 @@ acceleration, initial_speed: how objects move, relative to people (the same para
 default has the same keys, except for group, and applies to classes that are not listed.""")
 COMPRESSED = {('Subscribes', 'sensor_msgs/Image'): ' or sensor_msgs/CompressedImage'}  # added by subscribers.subscribe
 OPTIONAL = 'Optional. '  # in doc=, as roslaunch --ros-args calls arguments with an empty default required
-SECTIONS = 'Subscribes', 'Publishes', 'Services', 'Calls'
+SECTIONS = 'Subscribes', 'Publishes', 'Services'
 
 
 class Entry(NamedTuple):
@@ -52,8 +52,6 @@ class Entry(NamedTuple):
 
 
 class Node(NamedTuple):
-    """A node and its docstring."""
-
     name: str
     node_class: type
     summary: str
@@ -62,8 +60,6 @@ class Node(NamedTuple):
 
 
 class Parameter(NamedTuple):
-    """One parameter of a node."""
-
     name: str
     kind: str
     default: str  # as in YAML
@@ -73,24 +69,12 @@ class Parameter(NamedTuple):
 
 
 class Launch(NamedTuple):
-    """A launch file."""
-
     name: str
-    text: str  # the first comment
-    arguments: list  # [(name, default, doc)]
+    arguments: list  # [(name, doc)]
     tree: ElementTree.Element
 
 
-class _Comments(ElementTree.TreeBuilder):
-    def comment(self, data):
-        """Keep comments, which ElementTree drops (Python 3.8 has an option for it)."""
-        self.start('comment', {})
-        self.data(data)
-        self.end('comment')
-
-
 def nodes():
-    """All nodes of the package, sorted by name."""
     source = os.path.join(ROOT, 'src')
     paths = glob.glob(os.path.join(source, '**', '*_node.py'), recursive=True)
     modules = [os.path.relpath(path, source)[:-len('.py')].replace(os.sep, '.') for path in paths]
@@ -170,7 +154,6 @@ def as_yaml(value):
 
 
 def types_in_files(node):
-    """{path: types of the parameters} of the files in config/: one for each detector, or that in the docstring."""
     if node.node_class is DetectorNode:
         return {'config/%s.yaml' % name: (DetectorParams,) + row.own for name, row in DETECTORS.items()}
     paths = re.findall(r'config/\w+\.yaml', inspect.getdoc(node.node_class))
@@ -202,20 +185,17 @@ def classes_file():
 
 
 def launch_files():
-    """The launch files, by name."""
     return [launch_of(path) for path in sorted(glob.glob(os.path.join(ROOT, 'launch', '*.launch')))]
 
 
 def launch_of(path):
-    """The launch file of a path."""
-    tree = ElementTree.parse(path, ElementTree.XMLParser(target=_Comments())).getroot()
-    arguments = [(element.get('name'), element.get('default'), _one_line(element.get('doc', '')).replace(OPTIONAL, ''))
+    tree = ElementTree.parse(path).getroot()
+    arguments = [(element.get('name'), _one_line(element.get('doc', '')).replace(OPTIONAL, ''))
                  for element in tree.findall('arg') if element.get('value') is None]
-    return Launch(os.path.basename(path), _one_line(tree.find('comment').text), arguments, tree)
+    return Launch(os.path.basename(path), arguments, tree)
 
 
 def starting(node_name):
-    """The launch files in which a node is started, and its element there."""
     return [(launch, element) for launch in launch_files() for element in launch.tree.iter('node')
             if (element.get('pkg'), element.get('type')) == ('ros_3d_bb', node_name)]
 
@@ -227,23 +207,21 @@ def text_in_launch_file(node_name, parameter):
         for given in itertools.chain(*(each.findall('param') for each in [element] + groups)):
             argument = re.match(r'^\$\((?:arg|eval .* else) (\w+)\)$', given.get('value', ''))
             if given.get('name') == parameter and argument:
-                text, = (doc for name, _default, doc in launch.arguments if name == argument.group(1))
+                text, = (doc for name, doc in launch.arguments if name == argument.group(1))
                 return '%s (`%s:=`)' % (text, argument.group(1))
     return None
 
 
 def node_page(node):
-    """The page of a node, Markdown."""
     parts = ['# %s' % node.name, node.summary, node.text]
-    started = ['[%s](../launch_files.md#%s)' % (launch.name, launch.name.replace('.', ''))
-               for launch, _element in starting(node.name)]
+    started = [_code(launch.name) for launch, _element in starting(node.name)]
     parts.append('Started by %s. Names without a leading slash are relative to the namespace of the node; `~x` is '
                  '`%s/x`. Launch files can remap them.' % (', '.join(started), node.name))
     for section in SECTIONS:
         if section in node.sections:
-            rows = [(_code(entry.name), _type_link(entry.kind) + COMPRESSED.get((section, entry.kind), ''), entry.text)
+            rows = [(_code(entry.name), entry.kind + COMPRESSED.get((section, entry.kind), ''), entry.text)
                     for entry in node.sections[section]]
-            title = 'service' if section in ('Services', 'Calls') else 'topic'
+            title = 'service' if section == 'Services' else 'topic'
             parts += ['## ' + section, _table((title, 'type', 'description'), rows)]
     parts.append('## Parameters')
     for section, parameters in itertools.groupby(parameters_of(node), lambda parameter: parameter.section):
@@ -255,42 +233,16 @@ def node_page(node):
 
 
 def nodes_page():
-    """The index of the pages of nodes, Markdown."""
     rows = [('[%s](%s.md)' % (node.name, node.name), node.summary) for node in nodes()]
     return _page(['# Nodes', _table(('node', 'description'), rows)])
 
 
-def launch_page():
-    """The page of all launch files, Markdown."""
-    parts = ['# Launch files',
-             'Start a launch file with `roslaunch ros_3d_bb NAME.launch`. `roslaunch --ros-args ros_3d_bb NAME.launch` '
-             'lists its arguments.']
-    for launch in launch_files():
-        rows = [(_code(name), doc, 'required' if default is None else _code(_computed(default)))
-                for name, default, doc in launch.arguments]
-        parts += ['## ' + launch.name, launch.text, _table(('argument', 'description', 'default'), rows)]
-    return _page(parts)
-
-
-def messages_page():
-    """The page of the message definitions, Markdown."""
-    parts = ['# Messages']
-    for path in sorted(glob.glob(os.path.join(ROOT, 'msg', '*.msg'))):
-        with open(path, encoding='utf-8') as stream:
-            parts += ['## ' + os.path.basename(path), '```text\n%s```' % stream.read()]
-    return _page(parts)
-
-
 def pages():
-    """{path: text} of all pages."""
     made = {'doc/nodes/%s.md' % node.name: node_page(node) for node in nodes()}
-    made.update({'doc/nodes/index.md': nodes_page(), 'doc/launch_files.md': launch_page(),
-                 'doc/messages.md': messages_page()})
-    return made
+    return dict(made, **{'doc/nodes/index.md': nodes_page()})
 
 
 def config_files():
-    """{path: text} of the files in config/."""
     made = {path: config_file(node, kinds) for node in nodes() for path, kinds in types_in_files(node).items()}
     return dict(made, **{'config/classes.yaml': classes_file()})
 
@@ -304,18 +256,8 @@ def _table(titles, rows):
     return '\n'.join('| %s |' % ' | '.join(cell.replace('|', '\\|') for cell in line) for line in lines)
 
 
-def _type_link(kind):
-    package, name = kind.split('/')
-    return '[%s](../messages.md#%smsg)' % (kind, name.lower()) if package == 'ros_3d_bb' else kind
-
-
 def _code(text):
     return '`%s`' % text if text else 'empty'
-
-
-def _computed(default):
-    """A default without the syntax of roslaunch for an expression."""
-    return re.sub(r'^\$\(eval (.*)\)$', r'\1', default)
 
 
 def _one_line(text):

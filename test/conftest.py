@@ -81,7 +81,7 @@ def weights(tmp_path_factory):
     if DATA:
         return os.path.join(DATA, 'weights', 'yolov5n.pt')
     from support.red_detector import write_red_detector
-    return write_red_detector(str(tmp_path_factory.mktemp('weights') / 'red.torchscript'))
+    return write_red_detector(str(tmp_path_factory.mktemp('weights') / 'red.onnx'))
 
 
 @pytest.fixture(scope='session')

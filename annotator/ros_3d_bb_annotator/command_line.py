@@ -1,28 +1,25 @@
-"""Annotate the measurements of a session with ground truth in a window; or export, analyse or validate the session."""
+"""Annotate the measurements of a session with ground truth in a window; or export or analyse the session."""
 import argparse
 import sys
 
 from ros_3d_bb_annotator.document import Document
 from ros_3d_bb_annotator.estimates import ESTIMATOR
 from ros_3d_bb_annotator.export import analyse, export
-from ros_3d_bb_annotator.validation import problems_of
 
 
 def main(arguments=None):
-    """Run the command `annotator`. Returns the exit status, 1 if the session cannot be used or has problems."""
+    """Run the command `annotator`. Returns the exit status, 1 if the session cannot be used."""
     arguments = _arguments(arguments)
-    if not (arguments.export or arguments.analyse or arguments.validate):
+    if not (arguments.export or arguments.analyse):
         return _show(arguments.session)
     estimator = arguments.estimator or ESTIMATOR
     try:
         if arguments.export:
             count = export(Document(arguments.session), arguments.export, estimator)
             print('%s: %d rows' % (arguments.export, count))
-        elif arguments.analyse:
+        else:
             analysis, folder = analyse(arguments.session, arguments.out, estimator)
             analysis.print_results(folder)
-        else:
-            return _validate(Document(arguments.session))
     except (ValueError, OSError) as error:
         print('annotator: %s' % error, file=sys.stderr)
         return 1
@@ -39,16 +36,6 @@ def _show(folder):
     return run_window(folder)
 
 
-def _validate(document):
-    problems = list(problems_of(document))
-    for problem in problems:
-        print(problem)
-    done, total = document.progress
-    print('%s: %d measurements, %d annotated or rejected, %d problem%s'
-          % (document.folder, total, done, len(problems), '' if len(problems) == 1 else 's'))
-    return 1 if problems else 0
-
-
 def _arguments(arguments):
     parser = argparse.ArgumentParser(prog='annotator', description=__doc__)
     parser.add_argument('session', nargs='?', metavar='SESSION', help='folder of a measurement session')
@@ -56,13 +43,11 @@ def _arguments(arguments):
     actions.add_argument('--export', metavar='FILE.csv', help='write a table with one row per annotated '
                          'person, in millimetres')
     actions.add_argument('--analyse', action='store_true', help='noise analysis: report, figures and error model')
-    actions.add_argument('--validate', action='store_true', help='list the problems of the session; exit with 1 if '
-                         'there are any')
     parser.add_argument('--out', metavar='DIR', help='output folder of --analyse (default: SESSION/analysis)')
     parser.add_argument('--estimator', choices=('foreground', 'median', 'recorded'), help='positions of --analyse and '
                         '--export: new estimates, or the recorded ones (default: foreground; --export has no median)')
     parsed = parser.parse_args(arguments)
-    if (parsed.export or parsed.analyse or parsed.validate) and not parsed.session:
+    if (parsed.export or parsed.analyse) and not parsed.session:
         parser.error('a SESSION expected')
     if parsed.out and not parsed.analyse:
         parser.error('--out is for --analyse')

@@ -1,10 +1,8 @@
 """Dialogs with questions and messages."""
-from ros_3d_bb.sessions.plausibility import position_text
 from ros_3d_bb_annotator.marks import parse_marks
 from ros_3d_bb_annotator.qt import QtWidgets
 
 REASONS = ('', 'not on the mark', 'truncated by the image border', 'occluded', 'nobody found', 'wrong depth')
-ENTER_ALL = 'enter all'
 MOST_SHOWN = 5
 MARKS_HINT = ('One mark per line: name, X to the right of the camera, Z ahead of it,\n'
               'in mm or with a unit, such as: A1, -600, 1.5 m')
@@ -26,10 +24,8 @@ def ask_reason(parent, names):
 
 
 def ask_implausible(parent, problems, count):
-    """Ask about implausible truths: {index: lines of text or Outlier} among `count` measurements.
-
-    Returns ENTER_ALL, the truth (x, y, z) that was intended, or None to correct it.
-    """
+    """Ask about implausible truths: {index: lines of text or Outlier} among `count` measurements. Returns whether to
+    enter them."""
     found = [problem for lines in problems.values() for problem in lines]
     box = QtWidgets.QMessageBox(QtWidgets.QMessageBox.Warning, 'Implausible position',
                                 '<b>%s</b>' % ('Is this the true position?' if count == 1 else
@@ -39,16 +35,11 @@ def ask_implausible(parent, problems, count):
     text = '\n'.join(lines[:MOST_SHOWN] + ['…'] * (len(lines) > MOST_SHOWN))
     box.setInformativeText(text[:1].upper() + text[1:])
     correct = box.addButton('&Correct it', QtWidgets.QMessageBox.RejectRole)
-    answers = {box.addButton('&Enter it anyway', QtWidgets.QMessageBox.AcceptRole): ENTER_ALL}
-    intended = {tuple(problem.intended_m) for problem in found if getattr(problem, 'intended_m', None) is not None}
-    if len(intended) == 1 and len(problems) == count:
-        (x_m, z_m), = intended
-        use = box.addButton('&Use %s' % position_text((x_m, z_m)), QtWidgets.QMessageBox.AcceptRole)
-        answers[use] = x_m, None, z_m
+    enter = box.addButton('&Enter it anyway', QtWidgets.QMessageBox.AcceptRole)
     box.setDefaultButton(correct)
     box.setEscapeButton(correct)
     box.exec_()
-    return answers.get(box.clickedButton())
+    return box.clickedButton() is enter
 
 
 def ask_marks(parent, marks):

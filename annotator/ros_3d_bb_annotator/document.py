@@ -47,11 +47,9 @@ class Document(object):
         return True
 
     def color(self, index):
-        """Read the colour image of a measurement, see `read_color`."""
         return read_color(self._usable(index), self.camera)
 
     def depth(self, index):
-        """Read the depth image of a measurement, see `read_depth`."""
         return read_depth(self._usable(index), self._session)
 
     def known_errors(self, index):
@@ -91,7 +89,6 @@ class Document(object):
         self._annotated.extend(indices)
 
     def clear_truth(self, index):
-        """Remove the truth of the selected person."""
         self._edit((index, {'truth_mm': None}))
 
     def last_truth(self, index):
@@ -110,29 +107,24 @@ class Document(object):
         entry = self._content['frames'][index]
         self._edit((index, changes_of(entry, people_of(entry), int(person))))
 
-    def draw_box(self, index, box_px, person=None):
-        """Replace the selected detection by a box (x1, y1, x2, y2) drawn by hand, or add the box, and select it.
-
-        The truth of the selected person becomes that of the box, unless a new box is that of another person.
+    def draw_box(self, index, box_px):
+        """Add a box (x1, y1, x2, y2) drawn by hand, and select it. The truth of the selected person becomes that of the
+        box, unless it is that of another person.
         """
         measurement, entry = self.measurements[index], self._content['frames'][index]
         x1, y1, x2, y2 = (int(round(edge)) for edge in box_px)
         box_px = max(x1, 0), max(y1, 0), min(x2, self.camera.width), min(y2, self.camera.height)
-        others = tuple(other for number, other in enumerate(measurement.detections) if number != person)
+        others = measurement.detections
         box = measurement._replace(
             detections=others + (RecordedDetection(box_px, None, by_hand=True),), person=len(others)
         ).estimate(self.depth(index), self.camera, estimator_named(ESTIMATOR))
-
         people, detection, selected_px = people_of(entry), drawn(box_px, box), measurement.boxes_px[:1]
-        if person is not None or not (selected_px and boxes_of_others(box_px, selected_px)):
+        if not (selected_px and boxes_of_others(box_px, selected_px)):
             truth_mm = people[measurement.person].pop('truth_mm', None) if people else entry.get('truth_mm')
             detection.update({} if truth_mm is None else {'truth_mm': truth_mm})
-        person = len(people) if person is None else person
-        people[person:person + 1] = [detection]
-        self._edit((index, changes_of(entry, people, person)))
+        self._edit((index, changes_of(entry, people + [detection], len(people))))
 
     def delete_box(self, index):
-        """Delete the selected box and its truth."""
         measurement, entry = self.measurements[index], self._content['frames'][index]
         if measurement.person is None:
             raise ValueError('measurement %s has no box' % measurement.id)
@@ -141,7 +133,6 @@ class Document(object):
         self._edit((index, changes_of(entry, people, None)))
 
     def reject(self, indices, reason):
-        """Reject measurements, which is undone in one step."""
         if not reason.strip():
             raise ValueError('a reason is needed to reject a measurement')
         self._edit(*((index, {'rejected': reason.strip()}) for index in indices))
@@ -157,7 +148,6 @@ class Document(object):
         return self._step(self.undo_steps, self.redo_steps)
 
     def redo(self):
-        """Redo the last undone edit. Returns the same as `undo`."""
         return self._step(self.redo_steps, self.undo_steps)
 
     def _changes_with_truth(self, index, truth_mm):

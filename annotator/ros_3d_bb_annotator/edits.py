@@ -16,7 +16,6 @@ class Edits(object):
         self._window = window
 
     def enter_truth(self, truth_m):
-        """Set the truth (x, y, z) of the selected measurements, and go to the next measurement."""
         self._enter_truth(self._window.selection, truth_m)
 
     def enter_for_label(self):
@@ -28,7 +27,6 @@ class Edits(object):
                                            and other.detections)])
 
     def same_as_last(self):
-        """Set the truth of the last annotated measurement, and go to the next measurement."""
         self._enter_read(lambda: self._window.document.last_truth(self._window.current), self._window.selection)
 
     def clear_truth(self):
@@ -37,7 +35,6 @@ class Edits(object):
         self._window.pane.truth.begin()
 
     def ask_reject(self):
-        """Ask for a reason, reject the selected measurements, and go to the next one."""
         indices = self._window.selection
         reason = dialogs.ask_reason(self._window, [self._window.document.measurements[index].id for index in indices])
         if reason:
@@ -58,11 +55,10 @@ class Edits(object):
             if self._window.pane.truth.has_keyboard():
                 self._window.pane.truth.begin()
 
-    def draw_box(self, box_px, is_new):
-        """Add a box drawn by hand, or replace the selected one, and select it. The truth has the keyboard then."""
+    def draw_box(self, box_px):
+        """Add a box drawn by hand, and select it. The truth has the keyboard then."""
         window = self._window
-        person = None if is_new else window.measurement.person
-        if self._edit(lambda document: document.draw_box(window.current, box_px, person)):
+        if self._edit(lambda document: document.draw_box(window.current, box_px)):
             position_m = window.document.estimates.of(window.current)[window.measurement.person]
             window.statusBar().showMessage('The box is selected' if position_m is not None else
                                            'The box has not enough depth for an estimate')
@@ -96,13 +92,9 @@ class Edits(object):
         """Set a truth (x, y, z) of measurements. The user is asked about those where it is implausible."""
         document = self._window.document
         problems = {index: found for index in indices for found in [truth_problems(document, index, truth_m)] if found}
-        if problems:
-            answer = dialogs.ask_implausible(self._window, problems, len(indices))
-            if answer is None:
-                self._window.pane.truth.begin()
-                return
-            if isinstance(answer, tuple):
-                truth_m = answer
+        if problems and not dialogs.ask_implausible(self._window, problems, len(indices)):
+            self._window.pane.truth.begin()
+            return
         self._window.pane.truth.forget_typed()
         x_m, y_m, z_m = truth_m
         self._enter(lambda document: document.set_truths(indices, x_m, z_m, y_m),

@@ -48,7 +48,6 @@ def detections_of(entry):
 
 
 def people_of(entry):
-    """As `detections_of`, with the truth of each person in the detection."""
     people = detections_of(entry)
     if people and entry.get('truth_mm'):
         people[int(entry.get('person', 0))]['truth_mm'] = entry['truth_mm']
@@ -87,7 +86,6 @@ def grid_of(content):
 
 
 def mark_entry(mark):
-    """Entry of a Mark in the grid."""
     return {'name': mark.name, 'x': millimetres(mark.x_m), 'z': millimetres(mark.z_m)}
 
 

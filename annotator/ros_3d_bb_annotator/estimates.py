@@ -21,7 +21,6 @@ class Estimates(object):
         self.update()
 
     def update(self):
-        """Adapt to changed measurements."""
         self._people = self._implausible = None
 
     def of(self, index, depth=None):
@@ -50,7 +49,6 @@ class Estimates(object):
                 yield index
 
     def complete(self):
-        """Compute the missing estimates."""
         for index in self.missing():
             self.of(index)
 

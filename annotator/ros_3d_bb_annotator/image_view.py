@@ -6,10 +6,9 @@ from ros_3d_bb_annotator.qt import Qt, QtCore, QtGui, QtWidgets, Signal
 
 BACKGROUND = QtGui.QColor(38, 40, 44)
 MIN_ZOOM, MAX_ZOOM, WHEEL_STEP = 1.0, 40.0, 1.2
-CLICK_PX, GRAB_PX = 4, 6  # maximum movement of a click, and distance from an edge, on the screen
+CLICK_PX = 4  # maximum movement of a click on the screen
 MIN_BOX_PX = 4  # smaller boxes are ignored
 GAP_PX = 6
-ALL_EDGES = (0, 1, 2, 3)
 
 
 class Panel(NamedTuple):
@@ -23,15 +22,14 @@ class Panel(NamedTuple):
 class ImageView(QtWidgets.QWidget):
     """View of two images of one size, which show the same part.
 
-    Wheel: zoom; drag: pan; click: select a box; Shift and drag: draw a box; drag an edge of the selected box: resize
-    it; Ctrl and drag: move it. Image coordinates are continuous: pixel (u, v) covers u..u+1 and v..v+1. `cursor` is a
-    pixel (u, v) or None. Signals: `pointed` when the cursor moves; `box_chosen` with the index of a box; `box_drawn`
-    with (x1, y1, x2, y2) in pixels, and whether it is a new box, not the selected one that was edited.
+    Wheel: zoom; drag: pan; click: select a box; Shift and drag: draw a box. Image coordinates are continuous: pixel
+    (u, v) covers u..u+1 and v..v+1. `cursor` is a pixel (u, v) or None. Signals: `pointed` when the cursor moves;
+    `box_chosen` with the index of a box; `box_drawn` with (x1, y1, x2, y2) in pixels.
     """
 
     pointed = Signal()
     box_chosen = Signal(int)
-    box_drawn = Signal(object, bool)
+    box_drawn = Signal(object)
 
     def __init__(self, parent=None):
         super(ImageView, self).__init__(parent)
@@ -101,8 +99,7 @@ class ImageView(QtWidgets.QWidget):
         if event.button() != Qt.LeftButton or self.panels[self._panel].image is None:
             return
         self._pressed_at = self._panned_from = event.localPos()
-        self._grabbed = self._edges_at(event)
-        if not self._grabbed and event.modifiers() & Qt.ShiftModifier:
+        if event.modifiers() & Qt.ShiftModifier:
             self._panned_from = None
             self._point_near(event)
             self._corner = self.cursor
@@ -112,54 +109,39 @@ class ImageView(QtWidgets.QWidget):
             self._panel = self._panel_at(event.localPos())
             if self.panels[self._panel].image is not None:
                 self._point_at(*self._pixel(event))
-                self.setCursor(Qt.SizeAllCursor if self._edges_at(event) else Qt.ArrowCursor)
         elif self._corner is not None:
             self._point_near(event)
         else:
-            (old_x, old_y), (x, y) = map(self._to_image, (
-                self._pressed_at if self._grabbed else self._panned_from, event.localPos()))
-            if self._grabbed:
-                self._move_edges(int(round(x - old_x)), int(round(y - old_y)))
-            else:
-                self._panned_from = event.localPos()
-                self._move_center(self._center[0] + (old_x - x) / self._size[0],
-                                  self._center[1] + (old_y - y) / self._size[1])
+            (old_x, old_y), (x, y) = map(self._to_image, (self._panned_from, event.localPos()))
+            self._panned_from = event.localPos()
+            self._move_center(self._center[0] + (old_x - x) / self._size[0],
+                              self._center[1] + (old_y - y) / self._size[1])
 
     def mouseReleaseEvent(self, event):  # noqa: N802
         if event.button() != Qt.LeftButton or self._pressed_at is None:
             return
         moved_px = (event.localPos() - self._pressed_at).manhattanLength()
-        is_new, is_click = not self._grabbed, self._corner is None and moved_px <= CLICK_PX
+        is_click = self._corner is None and moved_px <= CLICK_PX
         if self._corner is not None:
             self._point_near(event)
         box_px = self._band()
         self._cancel()
-        if is_click and is_new:
+        if is_click:
             number = self._scene.box_at(*self._to_image(event.localPos()))
             if number is not None:
                 self.box_chosen.emit(number)
-        elif not is_click and box_px is not None:
+        elif box_px is not None:
             x1, y1, x2, y2 = box_px
             if min(x2 - x1, y2 - y1) >= MIN_BOX_PX:
-                self.box_drawn.emit(box_px, is_new)
+                self.box_drawn.emit(box_px)
 
     def leaveEvent(self, _event):  # noqa: N802
         if self._corner is None:
             self._point_at(-1, -1)
 
     def _cancel(self):
-        """End the action of the mouse: `_corner`, the first corner of a box that is being drawn, is a pixel or None;
-        `_edited` is the box that is being changed, [x1, y1, x2, y2], or None; `_grabbed` are its moved edges."""
-        self._pressed_at = self._panned_from = self._corner = self._edited = None
-        self._grabbed = ()
-        self.update()
-
-    def _move_edges(self, columns, rows):
-        """Move the grabbed edges of the selected box by pixels."""
-        self._edited = list(self._scene.person_box().rect_px)
-        for edge in self._grabbed:
-            moved = self._edited[edge] + (rows if edge % 2 else columns)
-            self._edited[edge] = min(max(moved, 0), self._size[edge % 2])
+        """End the action of the mouse: `_corner`, the first corner of a box that is being drawn, is a pixel or None."""
+        self._pressed_at = self._panned_from = self._corner = None
         self.update()
 
     def _move_center(self, *center):
@@ -169,29 +151,11 @@ class ImageView(QtWidgets.QWidget):
         self.update()
 
     def _band(self):
-        """Box that is being drawn or edited, (x1, y1, x2, y2), including the pixels of both corners, or None."""
-        if self._edited is not None:
-            x1, y1, x2, y2 = self._edited
-            return min(x1, x2), min(y1, y2), max(x1, x2), max(y1, y2)
+        """Box that is being drawn, (x1, y1, x2, y2), including the pixels of both corners, or None."""
         if self._corner is None or self.cursor is None:
             return None
         (u1, v1), (u2, v2) = self._corner, self.cursor
         return min(u1, u2), min(v1, v2), max(u1, u2) + 1, max(v1, v2) + 1
-
-    def _edges_at(self, event):
-        """Edges (0 to 3) of the selected box at the mouse; with Ctrl all of them inside the box; () elsewhere."""
-        box = self._scene.person_box()
-        if box is None or event.modifiers() & Qt.ShiftModifier:
-            return ()
-        place, rect = event.localPos(), self.transform(self._panel).mapRect(QtCore.QRectF(
-            QtCore.QPointF(*box.rect_px[:2]), QtCore.QPointF(*box.rect_px[2:])))
-        if event.modifiers() & Qt.ControlModifier:
-            return ALL_EDGES if rect.contains(place) else ()
-        if not rect.adjusted(-GRAB_PX, -GRAB_PX, GRAB_PX, GRAB_PX).contains(place):
-            return ()
-        distances = (place.x() - rect.left(), place.y() - rect.top(), place.x() - rect.right(),
-                     place.y() - rect.bottom())
-        return tuple(edge for edge, distance in enumerate(distances) if abs(distance) <= GRAB_PX)
 
     def _rect_of(self, panel):
         width = (self.width() - GAP_PX) // 2

@@ -109,15 +109,12 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         self._go_to(self.current - 1)
 
     def next_new(self):
-        """Show the next measurement that is neither annotated nor rejected."""
         self._go_to_next(self._is_to_do, 'All done: %d of %d' % self.document.progress)
 
     def next_implausible(self):
-        """Show the next measurement with an implausible truth."""
         self._go_to_next(lambda number: number in self.document.estimates.implausible(), 'No implausible positions')
 
     def after_edit(self):
-        """Update the window from the document."""
         self.list.update_rows()
         self._show_state()
         self._start_estimates()

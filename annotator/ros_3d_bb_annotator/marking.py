@@ -34,10 +34,6 @@ class Scene(NamedTuple):
                   if x1 <= x < x2 and y1 <= y < y2]
         return min(inside)[1] if inside else None
 
-    def person_box(self):
-        """MarkedBox of the person, or None."""
-        return next((box for box in self.boxes if box.number == self.person), None)
-
 
 def paint_scene(painter, transform, scene):
     for samples in scene.samples:

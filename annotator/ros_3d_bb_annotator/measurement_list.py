@@ -108,7 +108,6 @@ class MeasurementList(QtWidgets.QTableView):
 
     @property
     def selection(self):
-        """Indices of the selected measurements in the order of the session."""
         return sorted(index.row() for index in self.selectionModel().selectedRows())
 
     def mark_current(self, number):

@@ -49,12 +49,10 @@ class MeasurementPane(QtWidgets.QWidget):
         self.truth.previewed.connect(self._show_preview)
 
     def set_usable(self, usable):
-        """Enable the widgets if there is a current measurement."""
         for widget in (self.images, self.people, self.truth, self.floor):
             widget.setEnabled(usable)
 
     def show_document(self, document):
-        """Set the document. No measurement is shown yet."""
         self._document, self._measurement, self._depth, self._shown_files = document, None, None, None
         self.header.setText('This session contains no measurements yet.')
         self.banner.hide()
@@ -169,7 +167,6 @@ def _label():
 
 
 def _detection_text(number, detection, position_m, truth_m):
-    """Description of a detection: the analysed estimate, the recorded one, and details."""
     details = (detection.support is not None and 'support %.0f %%' % (100 * detection.support),
                detection.truncated and 'truncated', detection.by_hand and 'drawn by hand')
     lines = ('no estimate' if position_m is None else position_text(position_m[::2]),

@@ -18,7 +18,6 @@ class Results(QtCore.QObject):
         self._window, self.is_busy, self.analysis = window, False, None
 
     def ask_export(self):
-        """Ask for a file, and write the table of errors to it."""
         path, _filter = QtWidgets.QFileDialog.getSaveFileName(
             self._window, 'Export CSV', os.path.join(self._window.document.folder, 'measurements.csv'), '*.csv')
         if path:

@@ -11,8 +11,7 @@ import pytest
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb_lab.evaluation.latency.benchmark import cpu_load
-from support.processes import hanging, killed_and_back, never_reading
+from support.processes import cpu_load, hanging, killed_and_back, never_reading
 from support.ros import wait_until
 from support.stage import PERIOD_NS, Stage
 

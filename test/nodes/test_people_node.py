@@ -36,7 +36,7 @@ def test_the_publisher_decides_the_type_of_images():
     """A message of another type is left out; the diagnostics report such a topic as silent."""
     image, received = depth_message(NS, 2000), {}
     for name, message in (('plain', image), ('other', String('no image')),
-                          ('compressed', compressed(image, 'compressedDepth rvl'))):
+                          ('compressed', compressed(image, 'compressedDepth'))):
         received[name] = []
         unsubscribe = subscribe('images/' + name, Image, received[name].append)
         sender = publisher('images/' + name, type(message))

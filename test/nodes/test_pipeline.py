@@ -3,10 +3,12 @@ import numpy as np
 import pytest
 from visualization_msgs.msg import Marker, MarkerArray
 
-from ros_3d_bb.bags.bag_writer import MOUNT_M, START_NS, session_images, write_bag
+from ros_3d_bb.bags.bag_writer import write_bag
+from ros_3d_bb.conversions.camera_msgs import START_NS
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.sessions.session_reader import read_session
+from support.bags import MOUNT_M, session_images
 from support.ros import Recorder, launched
 
 

@@ -1,11 +1,9 @@
-"""The window of viewer_node, which needs a display, and a master for the pause of the detector."""
+"""The window of viewer_node, which needs a display."""
 import os
 import subprocess
 
 import pytest
 import rospy
-from rosgraph_msgs.msg import Log
-from std_srvs.srv import SetBool, SetBoolResponse
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC
@@ -13,7 +11,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.sessions.session_reader import read_session
 from ros_3d_bb_lab.evaluation.launching import running
 from support.inputs import good_messages
-from support.ros import TIMEOUT_S, Recorder, publisher, wait_until
+from support.ros import TIMEOUT_S, publisher, wait_until
 from support.screen import press, start_screen
 
 START_NS = 1000 * NS
@@ -50,7 +48,7 @@ def window(monkeypatch, tmp_path):
     screen.kill()
 
 
-def test_keys_store_pause_and_quit(window):
+def test_keys_store_and_quit(window):
     process, folder = window
 
     def stored():
@@ -59,24 +57,6 @@ def test_keys_store_pause_and_quit(window):
         return entries(folder)
     wait_until(stored, 'a measurement')
     assert [(entry.stamp_ns, entry.label) for entry in entries(folder)] == [(START_NS, 'by hand')]
-    for key in ('l', 'Shift_L', 'b', 'Left', '7', 'Num_Lock', 'KP_Enter'):  # only b and 7 are characters
-        press_key(key)
-        rospy.sleep(0.3)
-    assert rospy.get_param('window/label') == 'b7'
-    press_key('d')
-    wait_until(lambda: not entries(folder), 'the deletion')
-    with Recorder('/rosout', Log, False) as log:
-        press_key('p')
-        wait_until(lambda: any('the service /detector/enable does not respond' in message.msg
-                               for message in log.messages), 'a warning about the missing detector')
-    calls = []
-    service = rospy.Service('detector/enable', SetBool,
-                            lambda request: SetBoolResponse(calls.append(request.data) is None, 'done'))
-    for presses in (1, 2, 3):
-        press_key('p')
-        wait_until(lambda: len(calls) == presses, 'the call of the detector')
     # It can close before press returns.
     wait_until(lambda: press(TITLE, 'q') or process.poll() is not None, 'the window')
     assert process.wait(timeout=20) == 0
-    assert calls == [False, True, False, True]  # the detector is resumed at the end
-    service.shutdown()

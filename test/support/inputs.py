@@ -11,7 +11,7 @@ from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
 from ros_3d_bb.camera.images import DepthImage
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS, CameraFrame, messages_of, transform_messages
+from ros_3d_bb.conversions.camera_msgs import CameraFrame, messages_of, transform_messages
 from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg,
                                                    time_from)
 from ros_3d_bb.conversions.planner_msgs import points_to_msg
@@ -61,7 +61,7 @@ TARGETS = {
     'detector_node yolov5': Target(
         _yolov5, {'detector': 'yolov5', 'weights': 'blind.pt', 'image_size': 64}, BOXES_TOPIC),
     'camera_pose_node': Target(CameraPoseNode, {}, ''),
-    'people_removal_node': Target(PeopleRemovalNode, {'inputs': 'scan, points, depth', 'tf_timeout': 0.0},
+    'people_removal_node': Target(PeopleRemovalNode, {'inputs': 'scan, points', 'tf_timeout': 0.0},
                                   '~scan_static'),
     'planner_bridge_node': Target(PlannerBridgeNode, {'tf_timeout': 0.0}, '~points'),
     'follow_node': Target(FollowNode, {'enabled': True}, ''),
@@ -82,7 +82,6 @@ def good_messages(stamp_ns):
     messages[TRACKS_TOPIC] = TrackedObjectArray(header=header, objects=[person(1, 2.0, 0.0)])
     messages['~scan'] = LaserScan(header=header, angle_increment=0.1, ranges=[1.0, 2.0, 3.0])
     messages['~points'] = points_to_msg(np.ones((3, 3)), header)
-    messages['~depth'], messages['~camera_info'] = messages[DEPTH_TOPIC], messages[INFO_TOPICS[0]]
     messages['cmd_vel_in'] = Twist(linear=Vector3(0.5, 0, 0), angular=Vector3(0, 0, 0.1))
     return messages
 

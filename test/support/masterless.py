@@ -75,6 +75,7 @@ def masterless(params=()):
         'rospy.get_param': lambda name, default=None: (
             dict(params) if name == '~' else dict(params).get(name.lstrip('~'), default)),
         'rospy.resolve_name': lambda name: '/' + name, 'rospy.is_shutdown': lambda: False,
+        'rospy.get_param_cached': lambda name, default: dict(params).get(name.lstrip('~'), default),
         'rospy.get_rostime': lambda: connections.now, 'rospy.rostime.get_rostime': lambda: connections.now,
         'rospy.logwarn_throttle': lambda _period_s, text, *arguments: text % arguments,
         'ros_3d_bb.nodes.common.subscribers._inputs': [],

@@ -17,7 +17,7 @@ def write_constant_network(path, outputs, input_shape=(1, 3, 96, 128), element=F
     return str(path)
 
 
-def outputs_of(head, boxes, scores, input_hw, strides=(8, 16, 32), bins=8):
+def outputs_of(head, boxes, scores, input_hw, strides=(8, 16, 32)):
     """Outputs of a head that contain boxes (n, 4), x1, y1, x2, y2, with scores (n, classes) in 0..1.
 
     A box is predicted by the cell of the first stride in which its center is. Other predictions have scores of 0.
@@ -26,10 +26,6 @@ def outputs_of(head, boxes, scores, input_hw, strides=(8, 16, 32), bins=8):
     center, size = (boxes[:, :2] + boxes[:, 2:]) / 2, boxes[:, 2:] - boxes[:, :2]
     if head == 'end-to-end':
         return [np.hstack((boxes, scores.max(axis=1)[:, None], scores.argmax(axis=1)[:, None]))[None]]
-
-    if head == 'rtdetr':
-        relative = np.hstack((center, size)) / np.array(input_hw[::-1] * 2, float)
-        return [np.hstack((relative, scores.max(axis=1)[:, None], scores.argmax(axis=1)[:, None]))[None]]
     cells = grid(input_hw, tuple(strides)).astype(float)
     columns, rows = (center // strides[0]).astype(int).T
     used = rows * -(-input_hw[1] // strides[0]) + columns
@@ -41,26 +37,9 @@ def outputs_of(head, boxes, scores, input_hw, strides=(8, 16, 32), bins=8):
             all_rows[:, :4] = np.hstack((cells[:, :2] * cells[:, 2:], cells[:, [2, 2]]))
         all_rows[used] = values
         return [np.delete(all_rows, 4, axis=1).T[None] if head == 'yolov8' else all_rows[None]]
-    if head == 'yolox':
-        all_rows = np.zeros((len(cells), 5 + scores.shape[1]))
-        all_rows[used] = np.hstack((center / stride - cell, np.log(size / stride), np.ones((len(boxes), 1)), scores))
-        return [all_rows[None]]
-
-    points = (cell + (0.0 if head == 'nanodet-plus' else 0.5)) * stride
-    all_rows = np.hstack((np.zeros((len(cells), scores.shape[1])), np.full((len(cells), 4 * bins), -1.0)))
-    distances = np.hstack((points - boxes[:, :2], boxes[:, 2:] - points)) / stride
-    all_rows[used] = np.hstack((scores, distributions(distances, bins)))
-    if head != 'picodet':
-        return [all_rows[None]]
-    ends = np.cumsum([(cells[:, 2] == stride).sum() for stride in strides])[:-1]
-    return [part[None] for part in np.split(all_rows[:, :scores.shape[1]], ends)
-            + np.split(all_rows[:, scores.shape[1]:], ends)]
-
-
-def distributions(distances, bins):
-    """Values before the softmax, (n, 4 * bins), of distributions whose expected values are distances (n, 4)."""
-    offsets = np.clip(distances, 0, bins - 1)[..., None] - np.arange(bins)
-    return np.log(np.clip(1 - np.abs(offsets), 1e-9, 1)).reshape(len(distances), 4 * bins)
+    all_rows = np.zeros((len(cells), 5 + scores.shape[1]))
+    all_rows[used] = np.hstack((center / stride - cell, np.log(size / stride), np.ones((len(boxes), 1)), scores))
+    return [all_rows[None]]
 
 
 def write_mean_network(path, input_shape=(1, 3, 96, 128), element=FLOAT, channels_last=False):

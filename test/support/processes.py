@@ -4,6 +4,8 @@ import glob
 import os
 import signal
 import socket
+import subprocess
+import sys
 import time
 from xmlrpc.client import ServerProxy
 
@@ -12,6 +14,20 @@ from rosgraph.network import write_ros_handshake_header
 
 from ros_3d_bb_lab.evaluation.latency.latency_probe_node import pid_of
 from support.ros import TIMEOUT_S, wait_until
+
+BUSY_LOOP = 'import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n    pass'
+
+
+@contextlib.contextmanager
+def cpu_load(cores):
+    """Other processes load some cores within the block. They end with this process in any case."""
+    processes = [subprocess.Popen([sys.executable, '-c', BUSY_LOOP]) for _core in range(cores)]
+    try:
+        yield
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
 
 
 def processes_naming(text):

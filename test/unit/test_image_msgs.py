@@ -6,11 +6,10 @@ import cv2
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
-from hypothesis.extra import numpy as arrays
 
 from ros_3d_bb.conversions.compressed_images import PNG
 from ros_3d_bb.conversions.image_msgs import LAYOUTS, array_from, imgmsg_to_depth, imgmsg_to_rgb
-from support.compressed import compressed_depth, rvl
+from support.compressed import compressed_depth
 
 IMAGES = st.builds(SimpleNamespace, width=st.integers(0, 2 ** 32 - 1) | st.integers(0, 9),
                    height=st.integers(0, 2 ** 32 - 1) | st.integers(0, 9),
@@ -114,28 +113,20 @@ def test_colour_is_decoded_to_rgb(format_text, name, largest):
 
 @pytest.mark.parametrize('format_text, data', [
     (DEPTH, compressed_depth(DEPTH_MM)), (DEPTH + ' png', compressed_depth(DEPTH_MM)),
-    (DEPTH + ' rvl', compressed_depth(DEPTH_MM, True)), ('mono16; compressedDepth', compressed_depth(DEPTH_MM)),
-    ('16UC1; png compressed ', encoded('.png', DEPTH_MM))], ids=range(5))
+    ('mono16; compressedDepth', compressed_depth(DEPTH_MM)),
+    ('16UC1; png compressed ', encoded('.png', DEPTH_MM))], ids=range(4))
 def test_depth_in_millimetres_is_exact(format_text, data):
     depth = imgmsg_to_depth(compressed_message(format_text, data))
     np.testing.assert_array_equal(depth.values, DEPTH_MM)
     assert depth.scale_m == 0.001
 
 
-@pytest.mark.parametrize('is_rvl', [False, True])
-def test_depth_in_metres_has_the_error_of_its_quantization(is_rvl):
-    depth = imgmsg_to_depth(compressed_message(QUANTIZED + ' rvl' * is_rvl, compressed_depth(DEPTH_M, is_rvl)))
+def test_depth_in_metres_has_the_error_of_its_quantization():
+    depth = imgmsg_to_depth(compressed_message(QUANTIZED, compressed_depth(DEPTH_M)))
     measured = DEPTH_M > 0
     np.testing.assert_array_equal(np.isfinite(depth.values), measured)
     assert np.all(np.abs(depth.values - DEPTH_M)[measured] <= 1.01 * DEPTH_M[measured] ** 2 / 10100)
     assert depth.scale_m == 1.0 and depth.values.dtype == np.float32
-
-
-@given(arrays.arrays(np.uint16, st.tuples(st.integers(1, 9), st.integers(1, 9)),
-                     elements=st.sampled_from([0, 0, 1, 7, 8, 900, 901, 32768, 65535])))
-def test_rvl_is_lossless(pixels):
-    depth = imgmsg_to_depth(compressed_message(DEPTH + ' rvl', bytes(12) + rvl(pixels)))
-    np.testing.assert_array_equal(depth.values, pixels)
 
 
 def png_declaring(width, height):
@@ -154,7 +145,7 @@ def jpeg_declaring(width, height):
 
 
 JPEG_BYTES, PNG_BYTES, DEPTH_BYTES = encoded('.jpg', SMOOTH), encoded('.png', SMOOTH), compressed_depth(DEPTH_MM)
-RVL_BYTES, QUANTIZED_BYTES = compressed_depth(DEPTH_MM, True), compressed_depth(DEPTH_M)
+QUANTIZED_BYTES = compressed_depth(DEPTH_M)
 COLORS = [('rgb8; jpeg compressed bgr8', data, word) for data, word in (
     (b'GIF89a' + bytes(99), 'neither'), (JPEG_BYTES[:len(JPEG_BYTES) // 2], 'truncated'),
     (PNG_BYTES[:60] + bytes(9) + PNG_BYTES[69:], 'damaged'), (jpeg_declaring(65500, 65500), '65500 x 65500'),
@@ -162,9 +153,7 @@ COLORS = [('rgb8; jpeg compressed bgr8', data, word) for data, word in (
 DEPTHS = [(DEPTH, b'', 'truncated'), (DEPTH, bytes(12) + PNG_BYTES, '16-bit'),
           (DEPTH, bytes(12) + png_declaring(60000, 60000), '60000 x 60000'),
           (QUANTIZED, struct.pack('<iff', 0, float('nan'), 0) + QUANTIZED_BYTES[12:], 'quantization'),
-          ('8UC1; compressedDepth', DEPTH_BYTES, 'encoding'), (DEPTH + ' rvl', RVL_BYTES[:-400], 'pixels'),
-          (DEPTH + ' rvl', RVL_BYTES[:12] + struct.pack('<II', 2 ** 31, 2 ** 31) + RVL_BYTES[20:], '2147483648'),
-          (DEPTH + ' rvl', RVL_BYTES[:20] + b'\xff' * 400 + bytes(4), 'damaged'),
+          ('8UC1; compressedDepth', DEPTH_BYTES, 'encoding'), (DEPTH + ' rvl', DEPTH_BYTES, 'png'),
           ('16UC1; jpeg compressed ', JPEG_BYTES, 'depth')]
 CASES = [(imgmsg_to_rgb,) + case for case in COLORS] + [(imgmsg_to_depth,) + case for case in DEPTHS]
 

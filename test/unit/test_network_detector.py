@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ros_3d_bb.detection.boxes import Detections, iou, non_maximum_suppression
-from ros_3d_bb.detection.network_detector import DetectionParams, NetworkDetector, Resize, fit_image, ranked
+from ros_3d_bb.detection.network_detector import DetectionParams, GREY, NetworkDetector, fit_image, ranked
 from ros_3d_bb.detection.onnx.heads import HEADS, layout_of
 from ros_3d_bb.detection.yolov5.backends import open_runtime
 from ros_3d_bb.detection.yolov5.predictions import Backend
@@ -39,14 +39,12 @@ def test_detects_the_person_in_a_measurement_session(session_folder, weights):
     assert np.median(overlaps) >= 0.93
 
 
-@pytest.mark.parametrize('mode, columns, padding', [
-    ('center', (20, 60), 7), ('corner', (0, 40), 7), ('stretch', (0, 80), None)])
-def test_images_are_placed_as_the_network_was_trained(mode, columns, padding):
+@pytest.mark.parametrize('padding, columns', [('center', (20, 60)), ('corner', (0, 40))])
+def test_images_are_placed_as_the_network_was_trained(padding, columns):
     image = np.full((20, 20, 3), 200, np.uint8)
-    scaled, _placement = fit_image(image, (40, 80), resize=Resize(mode, 7))
+    scaled, _placement = fit_image(image, (40, 80), padding=padding)
     assert scaled.shape == (40, 80, 3) and (scaled[:, columns[0]:columns[1]] == 200).all()
-    outside = np.delete(scaled, np.arange(*columns), axis=1)
-    assert set(np.unique(outside)) == (set() if padding is None else {padding})
+    assert (np.delete(scaled, np.arange(*columns), axis=1) == GREY).all()
 
 
 def test_boxes_are_in_image_pixels_and_clipped_to_the_image():
@@ -98,20 +96,19 @@ def test_suppression_agrees_with_a_naive_implementation(count, limit, max_det, s
 HW = 96, 128
 BOXES = np.array([(1.5, 2, 20, 30), (10, 3, 40, 20.25), (15, 2.5, 24, 33)])
 SCORES = np.array([(0.9, 0.1, 0.2), (0.3, 0.8, 0.1), (0.2, 0.1, 0.7)])
-STRIDES = {'nanodet-plus': (8, 16, 32, 64), 'picodet': (8, 16, 32, 64)}
 NAMES = ['person', 'dog', 'chair']
 
 
 def detections_in(outputs, layout, input_hw=HW, confidence=0.25):
-    given = [np.float32(outputs[index]) for index in layout.order]
-    found = HEADS[layout.head].decode(given, input_hw, layout.classes, confidence, layout.strides)
+    decode = HEADS[layout.head].decode
+    found = decode(list(map(np.float32, outputs)), input_hw, layout.classes, confidence, layout.strides)
     return ranked(found, range(layout.classes))
 
 
 @pytest.mark.parametrize('names', [NAMES, ()])
 @pytest.mark.parametrize('head', HEADS)
 def test_heads_are_recognised_and_decoded(head, names):
-    outputs = outputs_of(head, BOXES, SCORES, HW, STRIDES.get(head, (8, 16, 32)))
+    outputs = outputs_of(head, BOXES, SCORES, HW)
     layout = layout_of(outputs, HW, {}, names=names)
     assert layout.head == head
     assert layout.classes == (80 if HEADS[head].suppressed and not names else 3)
@@ -122,52 +119,35 @@ def test_heads_are_recognised_and_decoded(head, names):
     assert len(detections_in(outputs, layout, confidence=0.85).boxes) == 1
 
 
-def test_distributions_by_stride_in_other_orders_and_as_maps():
-    """Scores and distances of a stride in turn, and (1, channels, height, width); scores before the sigmoid."""
-    outputs = outputs_of('picodet', BOXES, SCORES, HW, STRIDES['picodet'])
-    with np.errstate(divide='ignore'):
-        logits = [np.log(np.clip(output, 1e-6, 1) / (1 - output)) for output in outputs[:4]]
-    sizes = [(12, 16), (6, 8), (3, 4), (2, 2)]
-    maps = []
-    for (height, width), scores, distances in zip(sizes, logits, outputs[4:]):
-        maps += [values[0].T.reshape(1, -1, height, width) for values in (distances, scores)]
-    layout = layout_of(maps, HW, {})
-    assert layout.order == (1, 3, 5, 7, 0, 2, 4, 6)
-    found = detections_in(maps, layout)
-    np.testing.assert_allclose(found.boxes, BOXES, atol=1e-3)
-    np.testing.assert_allclose(found.scores, SCORES.max(axis=1), atol=1e-6)
-
-
 def test_networks_that_suppress_are_known_by_their_metadata():
     rows = np.zeros((1, 252, 38))  # as many rows as the grid has cells
     assert layout_of([rows], HW, {'end2end': 'True'}).head == 'end-to-end'
     assert layout_of([rows], HW, {'args': "{'nms': True}"}).head == 'end-to-end'
 
 
-def test_boxes_relative_to_the_input_are_those_of_rtdetr_or_rejected():
-    """With metadata, the widths and heights of RT-DETR need not show in the values."""
+@pytest.mark.parametrize('metadata', [{}, {'end2end': 'True'}])
+def test_boxes_relative_to_the_input_are_rejected(metadata):
+    """As those of RT-DETR."""
     rows = np.zeros((1, 300, 6))  # most are padding
     rows[0, 0] = 0.2, 0.2, 0.6, 0.8, 0.9, 0
-    assert layout_of([rows], HW, {'head': 'RTDETRDecoder', 'end2end': 'True'}).head == 'rtdetr'
-    for metadata in ({}, {'end2end': 'True'}):
-        with pytest.raises(ValueError, match='from 0 to 1'):
-            layout_of([rows], HW, metadata)
+    with pytest.raises(ValueError, match='from 0 to 1'):
+        layout_of([rows], HW, metadata)
 
 
-def by_stride(channels):
-    return [np.zeros((1, count) + size) for count in channels for size in ((12, 16), (6, 8), (3, 4))]
+def test_rows_without_objectness_are_those_of_yolov6():
+    rows = np.hstack((np.random.RandomState(0).uniform(0, 100, (252, 4)), np.ones((252, 1)), np.zeros((252, 3))))
+    assert layout_of([rows[None]], HW, {}).head == 'yolov5'
 
 
 @pytest.mark.parametrize('given, reason', [
-    (dict(outputs=by_stride((80, 4))), 'first output'),  # distances that are no distributions, as of RTMDet
-    (dict(outputs=by_stride((80, 4)), head='nanodet'), 'first output'),
+    (dict(outputs=[np.zeros((1, 80, 12, 16))]), 'first output'),  # by stride, as of RTMDet
     (dict(outputs=[np.zeros((1, 252, 4)), np.zeros((1, 252, 80))]), '252 x 80, .* no known head'),  # boxes and scores
+    (dict(outputs=[np.full((1, 252, 112), -1.0)]), 'no known head'),  # distributions of distances, as of NanoDet
     (dict(outputs=[np.zeros((1, 252, 80)), np.zeros((1, 252, 4))]), 'separate outputs'),  # of DAMO-YOLO
     (dict(outputs=[np.zeros((1, 80, 252)), np.zeros((1, 4, 252))]), 'separate outputs'),
     (dict(outputs=[]), 'first output'), (dict(outputs=[np.zeros((1, 77, 79))]), 'no known head'),
     (dict(outputs=[np.full((1, 300, 6), 0.3)]), 'no known head'),  # boxes and scores of two classes
-    (dict(names=['a', 'b']), '2 names for its 3 classes'), (dict(head='yolox'), 'cells of strides'),
-    (dict(head='nanodet', outputs=[np.ones((1, 252, 35)) * 7], names=NAMES * 2), '35 columns')])
+    (dict(names=['a', 'b']), '2 names for its 3 classes')])
 def test_outputs_that_do_not_fit_are_rejected(given, reason):
     outputs = outputs_of('yolov8', BOXES, SCORES, HW)
     with pytest.raises(ValueError, match=reason):

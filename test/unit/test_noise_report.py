@@ -22,8 +22,7 @@ from support.small_session import change_json
 from support.synthetic_session import write_synthetic_session
 
 pytestmark = pytest.mark.slow  # each model is fitted many times
-FIGURES = ['layout', 'z_error', 'z_rms', 'z_variance', 'x_error', 'x_variance', 'sigma', 'z_distribution',
-           'x_distribution']
+FIGURES = ['z_error', 'z_rms', 'x_error', 'sigma', 'z_distribution', 'x_distribution']
 
 
 def run(monkeypatch, *arguments):
@@ -105,7 +104,7 @@ def test_what_was_left_out_is_listed_and_does_not_prevent_the_analysis(tmp_path,
     run(monkeypatch, folder, '--out', tmp_path / 'out')
     errors = capsys.readouterr().err.splitlines()
     assert [line.split(': ')[1] for line in errors] == ['frame-000', 'frame-004 (A1)']
-    assert 'Z 160 mm is implausible' in errors[0] and 'Z 1600 mm would be plausible' in errors[0]
+    assert 'Z 160 mm is implausible' in errors[0]
     summary = json.loads((tmp_path / 'out' / 'summary.json').read_text())
     assert [outlier['name'] for outlier in summary['outliers']] == ['frame-000', 'frame-004 (A1)']
     assert dict(map(tuple, summary['left_out'])).keys() == {'frame-001', 'frame-002', 'frame-003', 'frame-005'}

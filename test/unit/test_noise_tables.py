@@ -3,7 +3,6 @@ import pytest
 
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.camera.images import DepthImage
-from ros_3d_bb.sessions.plausibility import likely_errors
 from ros_3d_bb.sessions.session_writer import append
 from ros_3d_bb.sessions.snapshots import ColorImage, Snapshot
 from ros_3d_bb_lab.evaluation.noise.tables import read_session_measurements, read_table
@@ -76,13 +75,3 @@ def made(count, seed=0, noise_m=0.01):
     truth_m = np.stack((random.uniform(-1, 1, count), random.uniform(1, 4, count)), axis=1)
     error_m = np.stack((-0.1 * truth_m[:, 0], 0.1 - 0.05 * truth_m[:, 1]), axis=1)
     return truth_m + error_m + noise_m * random.normal(size=truth_m.shape), truth_m
-
-
-@pytest.mark.parametrize('factors', [(1, 0.001), (0.001, 0.001), (1, 10), (0.01, 1), (-1, 1)])
-def test_the_position_before_a_slip_is_recognised(factors):
-    truth_m = np.array([0.6, 2.5])
-    slip_m = truth_m * factors
-    likely = likely_errors(*made(60))
-    assert not likely.are_plausible([0.54, 2.475], slip_m)
-    assert likely.corrected_slip([0.54, 2.475], slip_m) == pytest.approx(truth_m)
-    assert likely.corrected_slip([0.54, 2.475], (0.1, 3.9)) is None

@@ -2,10 +2,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from, transform_points
-from ros_3d_bb.camera.images import DepthImage
+from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.planning.cost_grid import CELL_M, COMFORT_M, HALF_SIZE_M, HIGHEST, presence_costs
-from ros_3d_bb.planning.people_removal import are_inside, cylinders_of, pixels_inside, scan_parts
+from ros_3d_bb.planning.people_removal import are_inside, cylinders_of, scan_parts
 from ros_3d_bb.planning.planner_view import (covariances_after, footprint_points, in_frame, position_after,
                                              predicted_to, usable_tracks, with_usable_covariances)
 from support.tracks import STEP_S, track_at
@@ -116,7 +115,6 @@ def test_footprints_are_on_the_way_and_within_the_body(track, ahead_s):
         assert np.linalg.norm(points[:, :2] - place, axis=1).max() >= track.size_m[0] / 2 - 1e-6
 
 
-CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
 MARGIN_M = 0.2
 
 
@@ -148,19 +146,6 @@ def test_a_scan_is_divided_into_parts_of_nearly_the_same_time(count, increment_s
 @pytest.mark.parametrize('count, increment_s', [(0, 0.01), (5, 0.0), (5, -0.1), (5, np.nan), (5, np.inf), (500, 0.1)])
 def test_a_scan_without_plausible_times_is_one_part(count, increment_s):
     assert scan_parts(count, increment_s) == [(slice(None), 0.0)]
-
-
-@pytest.mark.parametrize('place_m', [(2.0, 0.3), (0.4, 0.1), (3.0, 2.5), (-2.0, 0.0)])
-def test_pixels_are_those_whose_points_lie_in_the_cylinder(place_m):
-    """Compared with all pixels one by one; the search is restricted to a part of the image."""
-    depth = DepthImage(np.random.RandomState(1).choice([0, 400, 1900, 2100, 3000], (48, 64)).astype(np.uint16), 0.001)
-    fixed_from_camera = transform_from((0, 0, 1), OPTICAL_ROTATION)
-    cylinders = cylinders_of([track_at(place_m + (0.85,), [0, 0, 0])], 0.0, MARGIN_M)
-    v, u = np.mgrid[:48, :64]
-    points_m = CAMERA.deproject(np.stack((u, v), axis=-1), depth.values * depth.scale_m)
-    expected = are_inside(transform_points(fixed_from_camera, points_m), cylinders) & (depth.values > 0)
-    assert (pixels_inside(depth, CAMERA, fixed_from_camera, cylinders) == expected).all()
-    assert expected.any() == (place_m in ((2.0, 0.3), (0.4, 0.1)))
 
 
 WIDTH_M = 0.5

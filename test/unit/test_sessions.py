@@ -13,7 +13,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.estimation.box3d import Box3D
 from ros_3d_bb.sessions import session_writer
 from ros_3d_bb.sessions.session_reader import SessionError, read_color, read_depth, read_session
-from ros_3d_bb.sessions.session_writer import append, remove
+from ros_3d_bb.sessions.session_writer import append
 from ros_3d_bb.sessions.snapshots import ColorImage, Snapshot
 from support.small_session import change_json
 
@@ -69,24 +69,6 @@ def test_measurements_are_read_back(target):
         np.testing.assert_allclose(detection.estimate_m, BOX.center_m, atol=1e-6)
         np.testing.assert_allclose(detection.size_m, BOX.size_m[:2], atol=1e-6)
         assert (detection.support, detection.truncated, detection.by_hand) == (BOX.support, BOX.truncated, False)
-
-
-def test_a_measurement_is_removed_with_its_images_unless_it_is_annotated(target):
-    ids = [append(target, measurement(number))[0] for number in range(3)]
-    remove(target, ids[1])
-    session = read_session(target)
-    assert [frame.id for frame in session.frames] == [ids[0], ids[2]]
-    assert sorted(os.listdir(os.path.join(target, 'color'))) == [ids[0] + '.png', ids[2] + '.png']
-    np.testing.assert_array_equal(read_color(session.frames[1], session.camera), measurement(2).color.pixels)
-    with pytest.raises(ValueError, match='no longer'):
-        remove(target, ids[1])
-    with session_writer.locked_update(target) as content:
-        content['frames'][1]['truth_mm'] = {'x': 0, 'z': 2000}
-    with pytest.raises(ValueError, match='annotated'):
-        remove(target, ids[2])
-    with session_writer.locked_update(target) as content:
-        content['frames'] += [{}, 7]  # invalid measurements do not prevent others
-    assert append(target, measurement(3))[0] not in ids
 
 
 def _append_many(target, first):

@@ -21,7 +21,7 @@ def run_of(images=IMAGES):
         future_m = places_m[:, None] + HORIZONS_S[:, None] * VELOCITY_MPS
         truth = RunTruth(np.array([10, 20]), places_m, np.tile(VELOCITY_MPS, (2, 1)),
                          future_m, np.array([VISIBLE, VISIBLE]), np.zeros(3))
-        found.append(Image(number, [], None, truth, [], number, None))
+        found.append(Image(number, [], None, truth, number, None))
     return Run('made', CameraModel(), tuple(found))
 
 

@@ -11,7 +11,6 @@ from ros_3d_bb.detection.yolov5.checkpoint import EXPECTED, read_checkpoint
 from ros_3d_bb.detection.yolov5.network import Network
 from support.checkpoints import write_checkpoint
 from support.layouts import layout
-from support.red_detector import write_red_detector
 
 LAYOUT = layout('6.0', 'n', 3)
 
@@ -109,7 +108,6 @@ def with_flipped_byte(content):
     (lambda path, content: write(path, b'Not Found'), 'zip'),
     (lambda path, content: write_checkpoint(path, LAYOUT, root='SegmentationModel'), 'SegmentationModel'),
     (lambda path, content: write_pickle(path, pickle.dumps({}, 2), zipfile.ZIP_DEFLATED), 'data.pkl is compressed'),
-    (lambda path, content: write_red_detector(path), '.torchscript'),
     (lambda path, content: None, 'No such file')])
 def test_errors_name_the_file_the_cause_and_the_expected_format(path, content, prepare, named):
     prepare(path, content)

@@ -10,7 +10,8 @@ import pytest
 import rosbag
 from std_msgs.msg import Header
 
-from ros_3d_bb.bags.bag_writer import START_NS, session_images, write_bag
+from ros_3d_bb.bags.bag_writer import write_bag
+from ros_3d_bb.conversions.camera_msgs import START_NS
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
 from ros_3d_bb.conversions.perception_msgs import (boxes2d_from_msg, boxes2d_to_msg, camera_from_msg, time_from,
                                                    tracks_from_msg, tracks_to_msg)
@@ -21,7 +22,7 @@ from ros_3d_bb_lab.evaluation.demo.scene_report import (BOXES_TOPIC, TRACKS_TOPI
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images, scenario_to_bag
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
-from support.bags import changed_bag, messages_in, scene_bag
+from support.bags import changed_bag, messages_in, scene_bag, session_images
 
 
 @pytest.fixture(scope='module')

@@ -206,8 +206,7 @@ def test_captures_are_appended_and_an_image_is_stored_once(viewer):
         messages = good_messages(START_NS + number)
         messages[BOXES3D_TOPIC] = boxes3d_to_msg([box], messages[BOXES3D_TOPIC].header, CAMERA)
         send_image(viewer, START_NS + number, messages)
-        with mock.patch('ros_3d_bb.nodes.common.label.patient_master') as master:
-            master.return_value.getParam.return_value = label
+        with mock.patch('rospy.get_param_cached', return_value=label):
             assert viewer.node.capture()[0] and not viewer.node.capture()[0]
     session = read_session(viewer.folder)
     assert (session.camera, session.frame_id) == (CAMERA, 'camera')

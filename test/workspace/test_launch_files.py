@@ -6,12 +6,10 @@ runs navigation.launch with the planners.
 import ast
 import glob
 import os
-import re
 import shlex
 from xml.etree import ElementTree
 
 import pytest
-import yaml
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPICS, INFO_TOPICS
 from support.code_blocks import BLOCKS
@@ -26,12 +24,11 @@ OF_USER = ('navigation.launch frame_world:=my_map odom_frame:=my_odom robot_fram
 MOUNT = '0.17 0 0.20 0 0 0 base_link camera_link'
 ON_ROBOT = 'jackal.launch driver:=pyrealsense2 planner:=costmap '
 ROBOT_NODES = ['camera_mount', 'people_node', 'planner_bridge_node', 'realsense_node']
-# A command, and what it sets: parameters, `nodes`, those that are `remote` or `respawned`, `TYPE:TOPIC` for a
+# A command, and what it sets: parameters, `nodes`, those that are `respawned`, `TYPE:TOPIC` for a
 # remapping, and `COSTMAP layers`.
 CASES = [
     (MEASURE, {'nodes': ['people_node', 'viewer_node'], '/viewer_node/session': '/a session',
-               '/viewer_node/window': True, '/tracker_node/target_frame': 'map',
-               'viewer_node:detector/enable': 'detector_node/enable'}),
+               '/viewer_node/window': True, '/tracker_node/target_frame': 'map'}),
     (OWN_DRIVER + 'width:=848 fps:=15 exposure:=0.008', {
         'nodes': ['realsense_node'], '/use_sim_time': None, '/realsense_node/frame_prefix': 'camera',
         '/realsense_node/width': 848, '/realsense_node/height': 480, '/realsense_node/fps': 15,
@@ -82,8 +79,7 @@ CASES = [
         '/detector_node/floor_height': 0, '/tracker_node/target_frame': 'map'}),
     ('simulation.launch rviz:=false error_model:=none', {
         '/bbox3d_node/floor_frame': 'base_link', '/bbox3d_node/error_model': None, '/tracker_node/error_model': None}),
-    (ON_ROBOT + 'computer:=192.168.131.20', {
-        'nodes': ROBOT_NODES, 'respawned': ROBOT_NODES, 'remote': ['people_node', 'planner_bridge_node']}),
+    (ON_ROBOT, {'nodes': ROBOT_NODES, 'respawned': ROBOT_NODES}),
     (ON_ROBOT + 'respawn:=false', {'respawned': []}),
     ('pipeline.launch planner:=costmap weights:=yolov5n.pt', {'respawned': []})]  # errors would be logged repeatedly
 
@@ -92,7 +88,6 @@ CASES = [
 def test_arguments_set_parameters_nodes_and_topics(command, expected):
     found, nodes = loaded(*shlex.split(command))
     found['nodes'] = sorted(nodes)
-    found['remote'] = sorted(name for name, node in nodes.items() if node.machine_name == 'people')
     found['respawned'] = sorted(name for name, node in nodes.items() if node.respawn)
     for node in nodes.values():
         found.update(('%s:%s' % (node.type, topic), target) for topic, target in node.remap_args)
@@ -123,18 +118,6 @@ def test_expressions_assign_no_name_which_roslaunch_of_melodic_rejects():
             if value.startswith('$(eval '):
                 nodes = ast.walk(ast.parse(value[len('$(eval '):-1], mode='eval'))
                 assert not any(isinstance(node, ast.ListComp) for node in nodes), (path, value)
-
-
-def test_commands_of_the_container_start_camera_and_pipeline():
-    with open(os.path.join(ROOT, 'docker', 'compose.yaml')) as stream:
-        services = yaml.safe_load(stream)['services']
-    nodes = {}
-    for name, service in services.items():
-        command = re.sub(r'\$\{\w+:-([^}]*)\}', r'\1', service['command'])  # variables have their defaults
-        program, wait, package, *arguments = shlex.split(command)
-        assert (program, wait, package) == ('roslaunch', '--wait', 'ros_3d_bb')
-        nodes[name] = set(loaded(*arguments)[1])
-    assert 'realsense_node' in nodes['camera'] and {'people_node', 'planner_bridge_node'} <= nodes['pipeline']
 
 
 def test_files_of_the_user_take_precedence(tmp_path):

@@ -66,10 +66,8 @@ def test_markers_are_updated_while_the_track_exists_and_deleted_once():
 
 
 @pytest.mark.parametrize('made, params, missing', [
-    ({'steps': 0}, ALL, {'prediction', 'prediction_ellipse'}),
-    ({'variances': None}, ALL, {'ellipse', 'prediction_ellipse'}),
+    ({'steps': 0}, ALL, {'prediction'}), ({'variances': None}, ALL, {'ellipse'}),
     ({'velocity': (0.0, 0.0, 0.0)}, ALL, {'velocity', 'prediction'}),
-    ({}, MarkerParams(), {'prediction_ellipse'}),
     ({}, ALL._replace(marker_namespaces=['id', 'ellipse']), set(NAMESPACES) - {'id', 'ellipse'})])
 def test_only_known_and_configured_parts_of_a_track_are_drawn(made, params, missing):
     assert set(name for name, _id in drawn([track(1, **made)], params)) == set(NAMESPACES) - missing

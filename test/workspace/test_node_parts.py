@@ -38,7 +38,7 @@ def test_a_node_that_cannot_start_names_the_launch_argument(name, parts, fault, 
     stored = {'/bbox3d_node': {'stride': 0}, '/tracker_node': {}, '/detector_node': {'weights': ''}}
     with mock.patch.multiple(rospy, init_node=mock.DEFAULT, logfatal=mock.DEFAULT, get_name=lambda: '/' + name,
                              resolve_name=lambda each: '/' + each, get_param=lambda each, _none: stored[each]) \
-            as mocked, mock.patch.object(startup, 'Registration'), pytest.raises(SystemExit):
+            as mocked, mock.patch.object(startup, 'cache_logging_parameter'), pytest.raises(SystemExit):
         startup.run_node(name, node, parts=parts)
     text, *values = mocked['logfatal'].call_args[0]
     printed = text % tuple(values)

@@ -2,13 +2,12 @@ import contextlib
 
 import numpy as np
 import pytest
-from sensor_msgs.msg import Image, LaserScan, PointCloud2, PointField
+from sensor_msgs.msg import LaserScan, PointCloud2, PointField
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.conversions.camera_msgs import transform_messages
-from ros_3d_bb.conversions.image_msgs import fill_image, imgmsg_to_depth
 from ros_3d_bb.conversions.perception_msgs import TRACKS_TOPIC, time_from, tracks_to_msg
 from ros_3d_bb.conversions.planner_msgs import points_to_msg, velocity_to_msg
 from ros_3d_bb.conversions.range_msgs import cloud_without, points_of_cloud
@@ -17,10 +16,9 @@ from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.follow_node import RESENT_S, FollowNode
 from ros_3d_bb.nodes.people_removal_node import PeopleRemovalNode
 from ros_3d_bb.nodes.speed_limit_node import SpeedLimitNode
-from support.compressed import compressed
 from support.inputs import transforms
 from support.masterless import masterless, on_the_wire
-from support.ros import camera_info, person
+from support.ros import person
 from support.tracks import track_at
 
 STAMP_NS = 1000 * NS
@@ -116,28 +114,6 @@ def test_points_of_people_are_dropped_or_nan_in_an_organised_cloud(height):
     else:
         assert np.isnan(left).all(axis=1).tolist() == [True, False, False, True] and not found.is_dense
         np.testing.assert_allclose(left[1:3], points[1:3])
-
-
-def test_pixels_of_people_become_invalid():
-    depth_mm = np.full((48, 64), 4000, np.uint16)
-    depth_mm[8:44, 26:38] = 2000
-    header = Header(stamp=time_from(STAMP_NS), frame_id='camera')
-    image = fill_image(Image(header=header), depth_mm, '16UC1')
-    with node_with('depth', walking(2.0, 0.0)) as connections:
-        assert sent(connections, 'depth', image) == image and connections.counts['depth with people'] == 1
-        connections.send('~camera_info', camera_info(STAMP_NS))
-        values = imgmsg_to_depth(sent(connections, 'depth', image)).values
-    assert (values[20:30, 26:38] == 0).all() and (values[depth_mm == 4000] == 4000).all()
-
-
-@pytest.mark.parametrize('people', [(), (walking(2.0, 0.0),)])
-def test_compressed_depth_of_another_unit_is_sent_as_an_image(people):
-    depth = fill_image(Image(header=Header(stamp=time_from(STAMP_NS), frame_id='camera')),
-                       np.full((48, 64), 8000, np.uint16), '16UC1')
-    with node_with('depth', *people, depth_scale=0.00025) as connections:
-        connections.send('~camera_info', camera_info(STAMP_NS))
-        values = imgmsg_to_depth(sent(connections, 'depth', compressed(depth, 'compressedDepth png'))).values
-    assert (values[24, 32] == 0) == bool(people) and values[0, 0] == 8000
 
 
 def test_a_cloud_of_another_layout_passes_as_it_is_also_where_people_are():

@@ -13,13 +13,13 @@ from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.bags.bag_pipeline import process_bag
 from ros_3d_bb.bags.bag_reader import BagError, BagReader
-from ros_3d_bb.bags.bag_writer import session_images, write_bag
+from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.bags.process_bag import main, with_params
 from ros_3d_bb.conversions.perception_msgs import boxes2d_from_msg, time_from, tracks_from_msg
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.pipeline.people_pipeline import Settings
 from ros_3d_bb.sessions.session_reader import read_session
-from support.bags import changed_bag, messages_in, scene_bag
+from support.bags import changed_bag, messages_in, scene_bag, session_images
 from support.ros import wait_until
 
 SCENE = {'duration': 1.5, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]},

@@ -43,8 +43,6 @@ class Waiting(NamedTuple):
 
 
 class BagRun(object):
-    """A run of the pipeline on one bag."""
-
     def __init__(self, reader: BagReader, settings: Settings, events: EventCounter) -> None:
         self._reader, self._settings, self._events = reader, settings, events
         needed = BOXES_TOPIC if settings.detector == NONE else COLOR_TOPIC
@@ -216,7 +214,6 @@ def process_bag(source: str, target: str, settings: Settings = Settings()) -> Ev
 
 
 def _outputs_of(settings: Settings) -> Set[str]:
-    """Return the names of the topics that the pipeline writes."""
     made = set(settings.name(topic) for topic in OUTPUTS)
     made.update(settings.name(topic, name) for topic in OUTPUTS_OF_CAMERA for name in settings.camera_names
                 if topic != BOXES_TOPIC or settings.detector != NONE)
@@ -224,7 +221,6 @@ def _outputs_of(settings: Settings) -> Set[str]:
 
 
 def _copy(raw: Raw, bag: rosbag.Bag) -> None:
-    """Write a Raw to a bag unchanged."""
     unused = type('Unused', (), {'_md5sum': raw.md5sum})  # rosbag requires a class, but uses the connection header
     bag.write(raw.topic, (raw.datatype, raw.data, raw.md5sum, unused), raw.time, raw=True,
               connection_header=raw.connection_header)

@@ -125,12 +125,10 @@ def _given_pose(given: argparse.Namespace) -> Tuple[float, float, float]:
 
 
 def params_of(settings: Settings, node: str) -> Tuple[Any, ...]:
-    """Return the parameters of a node, 'detection', 'bbox3d' or 'tracker', in settings."""
     return settings.detector_params if node == 'detection' else getattr(settings, node)
 
 
 def with_params(settings: Settings, node: str, **changed: Any) -> Settings:
-    """Return settings with changed parameters of a node, which are in the first of its parameter classes."""
     first, *others = params_of(settings, node)
     parts: Any = (first._replace(**changed), *others)
     return settings._replace(**{node: parts})

@@ -28,14 +28,12 @@ MIN_BETTER, MIN_BETTER_STDS = 0.15, 3.0  # how much higher the maximum must be t
 
 
 def size_fault(color: Camera, width: int, height: int) -> str:
-    """Compare the size of a depth image, in pixels, with that of the colour camera."""
     if (width, height) == color[:2]:
         return ''
     return 'the depth image has %d x %d pixels, the colour camera %d x %d' % ((width, height) + color[:2])
 
 
 def info_size_fault(camera: Camera, width: int, height: int, info_topic: str) -> str:
-    """Compare the size of a colour image, in pixels, with that of its camera_info."""
     if (width, height) == camera[:2]:
         return ''
     return ('the colour image has %d x %d pixels, its camera_info on %s is for %d x %d: remap the camera_info of this '

@@ -31,11 +31,9 @@ class DepthImage(NamedTuple):
 
     @property
     def shape(self) -> Tuple[int, ...]:
-        """Height and width."""
         return self.values.shape
 
     def part(self, rows: slice, columns: slice) -> np.ndarray:
-        """The values in rows and columns (slices)."""
         return self.values[rows, columns]
 
     def at(self, u: np.ndarray, v: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
@@ -89,11 +87,9 @@ class RgbdFrame(NamedTuple):
 
     @property
     def received(self) -> 'RgbdFrame':
-        """The frame as received, before it was turned upright."""
         return self.turned(-self.turns)
 
     def turned(self, turns: int) -> 'RgbdFrame':
-        """The frame turned by some clockwise quarter turns."""
         if not turns:
             return self
         camera_from_floor = self.camera_from_floor

@@ -98,7 +98,6 @@ class RegisteredDepth(object):
 
     @property
     def shape(self) -> Tuple[int, int]:
-        """Height and width of the colour image."""
         camera = self._registration.color_camera
         return camera.height, camera.width
 
@@ -110,16 +109,13 @@ class RegisteredDepth(object):
         return self._values
 
     def part(self, rows: slice, columns: slice) -> np.ndarray:
-        """The values in rows and columns (slices)."""
         return self._registration.register(self._depth, rows, columns)
 
     def at(self, u: np.ndarray, v: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """As `DepthImage.at`."""
         depth_m = self.values[v, u]
         return depth_m, depth_m > 0
 
     def measured_area(self) -> Tuple[int, int, int, int]:
-        """As `DepthImage.measured_area`."""
         return self._registration.area_px
 
 

@@ -50,7 +50,6 @@ class CameraFrame(NamedTuple):
 
 
 def absolute(name: str) -> str:
-    """Name of a topic with a leading slash."""
     return '/' + name.lstrip('/')
 
 
@@ -84,7 +83,6 @@ def info_of_images(message: CameraInfo, image_topic: str) -> CameraInfo:
 
 
 def _names_of(image_topic: str) -> List[str]:
-    """Return the parts of the name of an image topic, without that of its transport."""
     parts = image_topic.split('/')
     return parts[:-1] if parts[-1] in TRANSPORTS else parts
 

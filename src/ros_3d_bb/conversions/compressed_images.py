@@ -1,4 +1,4 @@
-"""Decoding of sensor_msgs/CompressedImage: JPEG, PNG, and depth of the compressed_depth_image_transport (PNG or RVL).
+"""Decoding of sensor_msgs/CompressedImage: JPEG, PNG, and depth of the compressed_depth_image_transport (PNG).
 
 The declared size is checked before anything is decoded. OpenCV is imported where it is used, see `camera.distortion`.
 """
@@ -13,7 +13,6 @@ PNG_GREY = 0  # colour type
 MAX_PIXELS = 2 ** 25  # an image of 8K video has 33 million pixels
 DEPTH_TRANSPORT, RVL = 'compressedDepth', 'rvl'
 DEPTH_HEADER = struct.Struct('<iff')  # ConfigHeader of the transport: format (unused), depthQuantA, depthQuantB
-MAX_NIBBLES = 10  # of a number in RVL, each with three bits
 
 
 def decode(format_text: str, data: bytes) -> Tuple[np.ndarray, str]:
@@ -24,7 +23,9 @@ def decode(format_text: str, data: bytes) -> Tuple[np.ndarray, str]:
     encoding, _separator, codec = format_text.partition(';')
     encoding, data = encoding.strip(), bytes(data)
     if DEPTH_TRANSPORT in format_text:
-        return _decode_depth(encoding, RVL in codec, data)
+        if RVL in codec:
+            raise ValueError('its depth is compressed by RVL; set the format of the publisher to png')
+        return _decode_depth(encoding, data)
     width, height, is_grey16 = _declared(data)
     _check_size(width, height)
     if is_grey16:
@@ -85,8 +86,8 @@ def _decode_with_opencv(data: bytes, unchanged: bool) -> np.ndarray:
     return pixels
 
 
-def _decode_depth(encoding: str, is_rvl: bool, data: bytes) -> Tuple[np.ndarray, str]:
-    """Decode a message of the compressed_depth_image_transport: its header, then 16-bit values as PNG or RVL.
+def _decode_depth(encoding: str, data: bytes) -> Tuple[np.ndarray, str]:
+    """Decode a message of the compressed_depth_image_transport: its header, then 16-bit values as PNG.
 
     Depth in metres, 32FC1, is stored as inverse depth: depth = A / (value - B), and 0 if it is not measured.
     """
@@ -96,14 +97,11 @@ def _decode_depth(encoding: str, is_rvl: bool, data: bytes) -> Tuple[np.ndarray,
         raise ValueError('its %d bytes are truncated' % len(data))
     _format, quant_a, quant_b = DEPTH_HEADER.unpack_from(data)
     content = data[DEPTH_HEADER.size:]
-    if is_rvl:
-        values = _decode_rvl(content)
-    else:
-        width, height, is_grey16 = _declared(content)
-        _check_size(width, height)
-        if not is_grey16:
-            raise ValueError('it does not contain a 16-bit grey PNG')
-        values = _decode_with_opencv(content, True)
+    width, height, is_grey16 = _declared(content)
+    _check_size(width, height)
+    if not is_grey16:
+        raise ValueError('it does not contain a 16-bit grey PNG')
+    values = _decode_with_opencv(content, True)
     if encoding != '32FC1':
         return values, '16UC1'
     if not (np.isfinite(quant_b) and np.isfinite(quant_a) and quant_a > 0):
@@ -113,48 +111,3 @@ def _decode_depth(encoding: str, is_rvl: bool, data: bytes) -> Tuple[np.ndarray,
         depth_m = np.float32(quant_a) / (values - np.float32(quant_b))
     depth_m[values == 0] = np.nan
     return depth_m, '32FC1'
-
-
-def _decode_rvl(data: bytes) -> np.ndarray:
-    """Decode RVL (Wilson, Fast Lossless Depth Image Compression, 2017): width, height, and runs of zeros and others.
-
-    A number has three bits in each nibble, lowest first; the highest bit of a nibble announces another one. Each run
-    is the count of zeros, the count of other pixels, and the zigzag difference of each of these to the one before.
-    """
-    if len(data) < 8:
-        raise ValueError('its %d bytes of RVL are truncated' % len(data))
-    width, height = struct.unpack_from('<II', data)
-    _check_size(width, height)
-    numbers = _rvl_numbers(data[8:len(data) - len(data) % 4])
-    at, done, zeros, others = 0, 0, [], []
-    while done < width * height and at + 1 < numbers.size:
-        zeros.append(numbers.item(at))
-        others.append(numbers.item(at + 1))
-        done += zeros[-1] + others[-1]
-        at += 2 + others[-1]
-    if done != width * height or at > numbers.size:
-        raise ValueError('its RVL has %d of %d x %d pixels' % (done, width, height))
-    lengths = np.array(others)
-    starts = 2 * np.arange(1, lengths.size + 1) + np.cumsum(lengths) - lengths  # of the differences of a run in numbers
-    within = np.arange(lengths.sum())
-    zigzag = numbers[within + np.repeat(starts - (np.cumsum(lengths) - lengths), lengths)]
-    pixels = np.zeros(width * height, np.uint16)
-    pixels[within + np.repeat(np.cumsum(zeros), lengths)] = np.cumsum((zigzag >> 1) ^ -(zigzag & 1)).astype(np.uint16)
-    return pixels.reshape(height, width)
-
-
-def _rvl_numbers(data: bytes) -> np.ndarray:
-    """Return the numbers of RVL, which are in nibbles of little-endian 32-bit words, the highest nibble first."""
-    octets = np.frombuffer(data, '<u4').astype('>u4').view(np.uint8)
-    nibbles = np.column_stack([octets >> 4, octets & 15]).ravel()
-    ends = np.flatnonzero(nibbles < 8)
-    starts = np.concatenate([[0], ends[:-1] + 1])[:ends.size]
-    lengths = ends - starts + 1
-    longest = lengths.max() if lengths.size else 0
-    if longest > MAX_NIBBLES:
-        raise ValueError('its RVL is damaged')
-    numbers = (nibbles[starts] & 7).astype(np.int64)
-    for digit in range(1, longest):
-        longer = np.flatnonzero(lengths > digit)
-        numbers[longer] |= (nibbles[starts[longer] + digit] & 7).astype(np.int64) << (3 * digit)
-    return numbers

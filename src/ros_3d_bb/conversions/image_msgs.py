@@ -77,7 +77,6 @@ def pixels_from(message: Any, encodings: Sequence[str] = tuple(LAYOUTS),
 
 
 def is_compressed(message: Any) -> bool:
-    """Whether an image message is a sensor_msgs/CompressedImage."""
     return hasattr(message, 'format')
 
 

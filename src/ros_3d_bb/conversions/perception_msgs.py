@@ -37,7 +37,6 @@ IMAGE_SIZE = re.compile(r' in ([0-9]{1,9}) x ([0-9]{1,9})\Z')
 
 
 def time_from(stamp_ns: int) -> genpy.Time:
-    """Convert integer nanoseconds to a ROS time."""
     return genpy.Time(*divmod(stamp_ns, NS))
 
 
@@ -94,7 +93,6 @@ def boxes2d_to_msg(boxes: np.ndarray, header: Header, labels: Optional[Sequence[
 
 def detections2d_to_msg(detections: Any, names: Sequence[str], header: Header,
                         image_size: Sequence[int]) -> Int32MultiArray:
-    """Convert `detection.boxes.Detections` as `boxes2d_to_msg`; `names` are the class names by number."""
     return boxes2d_to_msg(detections.boxes, header, [names[number] for number in detections.classes],
                           detections.scores, image_size)
 
@@ -288,7 +286,6 @@ def _is_covariance(elements_m2: Sequence[float]) -> bool:
 
 
 def tracks_to_msg(tracks: Iterable[TrackedObject], header: Header) -> TrackedObjectArray:
-    """Convert tracks (`types.TrackedObject`) to TrackedObjectArray."""
     return TrackedObjectArray(header=header, objects=[_track_to_msg(track) for track in tracks])
 
 
@@ -363,7 +360,6 @@ def _covariance_3x3(with_covariance: Any) -> np.ndarray:
 
 
 def _set_position(pose: Any, position_m: Sequence[float]) -> None:
-    """Set the position of a geometry_msgs/Pose that is not rotated."""
     _set_xyz(pose.position, position_m)
     pose.orientation.w = 1.0
 

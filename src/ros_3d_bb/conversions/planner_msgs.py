@@ -98,7 +98,6 @@ def grid_to_msg(costs: np.ndarray, cell_m: float, origin_m: Sequence[float], hea
 
 
 def velocity_to_msg(x: float, y: float, angular: float) -> Twist:
-    """Convert a velocity in the plane to geometry_msgs/Twist."""
     message = Twist()
     message.linear.x, message.linear.y, message.angular.z = x, y, angular
     return message
@@ -113,5 +112,4 @@ def velocity_from_msg(message: Twist) -> Tuple[float, float, float]:
 
 
 def pose_to_msg(x: float, y: float, yaw: float, header: Header) -> PoseStamped:
-    """Convert a pose in the plane to geometry_msgs/PoseStamped."""
     return PoseStamped(header, Pose(Point(x, y, 0.0), Quaternion(0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2))))

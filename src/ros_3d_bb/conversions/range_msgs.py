@@ -1,12 +1,8 @@
-"""Laser scans, point clouds and depth images: their points, and the same messages without some of them."""
+"""Laser scans and point clouds: their points, and the same messages without some of them."""
 import copy
 
 import numpy as np
-from sensor_msgs.msg import Image, LaserScan, PointCloud2, PointField
-from std_msgs.msg import Header
-
-from ros_3d_bb.camera.images import DepthImage
-from ros_3d_bb.conversions.image_msgs import fill_image
+from sensor_msgs.msg import LaserScan, PointCloud2, PointField
 
 SUFFICIENT = 'x', 'y', 'z'
 
@@ -49,10 +45,3 @@ def cloud_without(message: PointCloud2, is_removed: np.ndarray) -> PointCloud2:
         rows[is_removed] = 255  # a NaN as FLOAT32
     changed.data = rows.tobytes()
     return changed
-
-
-def depth_without(header: Header, depth: DepthImage, is_removed: np.ndarray) -> Image:
-    """A sensor_msgs/Image of a DepthImage in which some pixels, bool (h, w), are invalid (REP 118)."""
-    is_float = depth.values.dtype.kind == 'f'
-    values = np.where(is_removed, depth.values.dtype.type(np.nan if is_float else 0), depth.values)
-    return fill_image(Image(header=header), values, '32FC1' if is_float else '16UC1')

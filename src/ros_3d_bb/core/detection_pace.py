@@ -70,7 +70,6 @@ class DetectionPace(object):
                 self._set(self.size if self.size in sizes else max(sizes), 1)
 
     def add_image(self, stamp_ns: int) -> bool:
-        """Add the stamp of an image that arrived. Returns whether to detect in it."""
         with self._lock:
             self._stamps_ns.append(stamp_ns)
             if self.interval > 1 and self._detected_ns is not None:

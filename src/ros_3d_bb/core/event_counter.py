@@ -14,7 +14,6 @@ class EventCounter(object):
         self.sentences: Dict[str, str] = {}  # first message of each event that has one
 
     def count(self, event: str, amount: int = 1) -> None:
-        """Count an expected event."""
         self.count_all({event: amount})
 
     def count_all(self, amounts: Mapping[str, int]) -> None:

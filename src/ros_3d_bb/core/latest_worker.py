@@ -27,7 +27,6 @@ class NewestWorker(object):
         return replaced
 
     def stop(self) -> None:
-        """Finish the current item and stop the thread."""
         with self._news:
             self._stopped = True
             self._news.notify()

@@ -97,7 +97,6 @@ class ObjectClasses(NamedTuple):
     default: ObjectClass = DEFAULT_CLASS
 
     def of(self, label: str) -> ObjectClass:
-        """The ObjectClass of a class name."""
         return self.listed.get(label, self.default)
 
     def standard_name(self, label: str) -> str:

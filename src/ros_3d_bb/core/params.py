@@ -102,7 +102,6 @@ def params_from(given: Mapping[str, Any], *kinds: Any) -> List[Any]:
 
 
 def nearest_name(name: str, known: Iterable[str]) -> str:
-    """The known name that is most similar to an unknown one."""
     return difflib.get_close_matches(name, known, 1, 0.0)[0]
 
 

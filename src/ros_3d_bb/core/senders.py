@@ -14,7 +14,6 @@ class Senders(object):
         self._nodes: Set[str] = set()
 
     def add(self, node: str) -> None:
-        """Record the sender of a message."""
         if node != self._latest:
             self._alternate = self._alternate or node in self._nodes
             self._nodes.add(node)

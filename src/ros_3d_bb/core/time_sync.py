@@ -60,7 +60,6 @@ class MessageCache(object):
         return len(self._entries)
 
     def __reversed__(self) -> Iterator[Stamped]:
-        """Iterate over the entries, newest first."""
         return reversed(self._entries)
 
     def add(self, stamp_ns: int, arrival_ns: int, value: Any) -> bool:
@@ -91,12 +90,10 @@ class MessageCache(object):
 
     @property
     def period_ns(self) -> int:
-        """`median_period_ns` of the cached values."""
         return median_period_ns([entry.stamp_ns for entry in list(self._entries)])
 
     @property
     def half_period_ns(self) -> int:
-        """`half_period_of` the cached values."""
         return half_period_of([entry.stamp_ns for entry in list(self._entries)])
 
     def nearest(self, stamp_ns: int, tolerance_ns: float = 0) -> Optional[Stamped]:
@@ -167,7 +164,6 @@ class StampSynchronizer(object):
 
     @property
     def has_camera(self) -> bool:
-        """Whether a camera_info has arrived."""
         return len(self._cameras) > 0 or self._plain_camera is not None
 
     def add_depth(self, stamp_ns: int, now_ns: int, depth: Any) -> None:
@@ -212,7 +208,6 @@ class StampSynchronizer(object):
             self._match_waiting(now_ns)
 
     def end(self) -> None:
-        """Give up waiting, at the end of the input."""
         self._match_waiting(NEVER)
 
     def _end_before_jump(self, start_ns: int) -> None:
@@ -375,5 +370,4 @@ class CameraClocks(object):
         self._newest_ns = {}
 
     def _is_tracked(self, camera_name: str, now_ns: int) -> bool:
-        """Whether an image of a camera was tracked within the last `ALIVE_NS`."""
         return camera_name in self._tracked and now_ns - self._tracked[camera_name].arrival_ns <= ALIVE_NS

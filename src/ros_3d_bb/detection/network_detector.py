@@ -12,15 +12,13 @@ from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.detection.boxes import Detections, non_maximum_suppression
 
 RGB, BGR = (0, 1, 2), (2, 1, 0)  # orders of the channels of an RGB image
-RESIZE_MODES = ('center', 'corner', 'stretch')
+GREY = 114  # of the padding
 MAX_INPUT_PX = 4096  # larger inputs exhaust the memory
 MAX_CANDIDATES = 30000  # maximum number of boxes before suppression, as in ultralytics
 
 
 @parameters('Detector yolov5')
 class DetectionParams(NamedTuple):
-    """What counts as a detection."""
-
     classes: list = Param(('person',), 'Classes to detect: names or numbers of the model.', live=True)
     confidence: float = Param(
         0.25, 'Smallest score of a detection (of YOLOv5 and YOLOX, objectness times class score).', limits=(0, 1),
@@ -40,26 +38,15 @@ class DetectionParams(NamedTuple):
         limits=(0, MAX_INPUT_PX), live=(0, 1280))
 
 
-class Resize(NamedTuple):
-    """How an image becomes the input of a network.
-
-    mode is `center` (scaled with its aspect ratio and padded on two sides), `corner` (padded at the right and at the
-    bottom) or `stretch` (not padded); padding is a grey level.
-    """
-
-    mode: str = 'center'
-    padding: int = 114
-
-
 class Placement(NamedTuple):
-    """Scale and shift, x and y, from an image to the network's input."""
+    """Scale, and shift in x and y, from an image to the network's input."""
 
-    scale: Tuple[float, float]
+    scale: float
     shift: Tuple[int, int]
 
     def undo(self, boxes: np.ndarray, image_hw: Sequence[int]) -> np.ndarray:
         """Convert boxes from input pixels to image pixels, clipped to the image."""
-        boxes = (boxes - np.tile(self.shift, 2)) / np.tile(self.scale, 2)
+        boxes = (boxes - np.tile(self.shift, 2)) / self.scale
         height, width = image_hw
         return np.clip(boxes, 0, [width, height, width, height])
 
@@ -67,20 +54,12 @@ class Placement(NamedTuple):
 class NetworkDetector(object):
     """Detector that runs a network.
 
-    Parameters
-    ----------
-    network
-        A backend of `detection.yolov5.backends` or an `onnx.onnx_model.OnnxModel`. Its method `candidates` takes an
-        RGB image (height, width, 3), uint8, and a confidence, and returns the Detections above it in pixels of this
-        image, in any order. Its attributes are `names`, the class names; `stride`, of which height and width must be
-        multiples; `input_hw`, the only (height, width) that it accepts, or None if it accepts any; `resize`, a
-        `Resize`; `suppressed`, whether it suppresses overlapping boxes itself; and `description`, a text for logs.
-    params : DetectionParams
-
-    Raises
-    ------
-    ValueError
-        If there is no class to detect, or the model does not have one of the classes.
+    `network` is a backend of `detection.yolov5.backends` or an `onnx.onnx_model.OnnxModel`. Its method `candidates`
+    takes an RGB image (height, width, 3), uint8, and a confidence, and returns the Detections above it in pixels of
+    this image, in any order. Its attributes are `names`, the class names; `stride`, of which height and width must be
+    multiples; `input_hw`, the only (height, width) that it accepts, or None if it accepts any; `padding`, see
+    `fit_image`; `suppressed`, whether it suppresses overlapping boxes itself; and `description`, a text for logs.
+    Raises ValueError if there is no class to detect, or the model does not have one of the classes.
     """
 
     def __init__(self, network: Any, params: DetectionParams = DetectionParams()) -> None:
@@ -109,7 +88,7 @@ class NetworkDetector(object):
 
     def detect(self, image: np.ndarray) -> Detections:
         """Return the Detections in an RGB image (height, width, 3), uint8."""
-        scaled, placement = fit_image(image, self._input_hw, self._stride, self._network.resize)
+        scaled, placement = fit_image(image, self._input_hw, self._stride, self._network.padding)
         candidates = ranked(self._network.candidates(scaled, self._params.confidence), self._classes)
         iou_limit = 1 if self._network.suppressed else self._params.iou
         detections = non_maximum_suppression(candidates, iou_limit, self._params.max_det)
@@ -123,51 +102,44 @@ def class_number(entry: Any, names: List[str]) -> int:
     if str(entry).isdigit() and int(entry) < len(names):
         return int(entry)
     if names == [str(number) for number in range(len(names))]:
-        raise ValueError('class %r is unknown: the model has no names of its %d classes; write them to the key names '
-                         'of a YAML file beside an ONNX file, see doc/onnx.md' % (entry, len(names)))
+        raise ValueError('class %r is unknown: the model has no names of its %d classes; list them in a '
+                         'YAML file beside an ONNX file, see doc/onnx.md' % (entry, len(names)))
     raise ValueError('class %r (~classes) is not among the %d classes of the model: %s'
                      % (entry, len(names), ', '.join(names)))
 
 
 def fit_image(image: np.ndarray, input_hw: Tuple[int, int], stride: Optional[int] = None,
-              resize: Resize = Resize()) -> Tuple[np.ndarray, Placement]:
-    """Scale an image to the network's input and pad it.
+              padding: str = 'center') -> Tuple[np.ndarray, Placement]:
+    """Scale an image to the network's input and pad it, on two sides (`center`) or at the right and at the bottom.
 
     It is padded to `input_hw`, or to the next multiple of a stride. Returns the image, which is the given one if it
     already has this size, and its Placement.
     """
     height, width = image.shape[:2]
-    if resize.mode == 'stretch':
-        scaled_hw = input_hw
-    else:
-        scale = min(input_hw[0] / float(height), input_hw[1] / float(width))
-        scaled_hw = max(int(round(height * scale)), 1), max(int(round(width * scale)), 1)
+    scale = min(input_hw[0] / float(height), input_hw[1] / float(width))
+    scaled_hw = max(int(round(height * scale)), 1), max(int(round(width * scale)), 1)
     if scaled_hw != (height, width):
         image = cv2.resize(image, scaled_hw[::-1], interpolation=cv2.INTER_LINEAR)
     pad_y, pad_x = (outer - inner for outer, inner in zip(input_hw, scaled_hw))
     if stride is not None:
         pad_y, pad_x = pad_y % stride, pad_x % stride
-    top, left = (pad_y // 2, pad_x // 2) if resize.mode == 'center' else (0, 0)
+    top, left = (pad_y // 2, pad_x // 2) if padding == 'center' else (0, 0)
     if pad_x or pad_y:
         image = cv2.copyMakeBorder(image, top, pad_y - top, left, pad_x - left, cv2.BORDER_CONSTANT,
-                                   value=(resize.padding,) * 3)
-    scale_xy = (scaled_hw[1] / float(width), scaled_hw[0] / float(height)) if resize.mode == 'stretch' else (scale,) * 2
-    return image, Placement(scale_xy, (left, top))
+                                   value=(GREY,) * 3)
+    return image, Placement(scale, (left, top))
 
 
-def batch_of(image: np.ndarray, order: Sequence[int] = RGB, mean: Sequence[float] = (0.0, 0.0, 0.0),
-             std: Sequence[float] = (255.0, 255.0, 255.0), dtype: Any = np.float32) -> np.ndarray:
-    """Convert an RGB image (height, width, 3), uint8, to a batch (1, 3, height, width) of (value - mean) / std.
-
-    `order` is that of the channels in the batch, in mean and in std.
+def batch_of(image: np.ndarray, order: Sequence[int] = RGB, scale: float = 255.0,
+             dtype: Any = np.float32) -> np.ndarray:
+    """Convert an RGB image (height, width, 3), uint8, to a batch (1, 3, height, width) of the channels in an order,
+    divided by a scale.
     """
     batch, channels = np.empty((1, 3) + image.shape[:2], dtype), cv2.split(image)
-    for plane, number, mean_value, std_value in zip(batch[0], order, mean, std):
+    for plane, number in zip(batch[0], order):
         plane[...] = channels[number]
-        if mean_value != 0:
-            plane -= dtype(mean_value)
-        if std_value != 1:
-            plane /= dtype(std_value)
+    if scale != 1:
+        batch /= dtype(scale)
     return batch
 
 

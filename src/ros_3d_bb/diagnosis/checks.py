@@ -19,7 +19,6 @@ UNSTAMPED_FIX = 'their publisher must set it to the time at which the image was 
 
 
 def findings(seen):
-    """Run all checks of an `Observations`. Returns a list of Finding."""
     checks = (_clock, _publishers, _images, check_camera, check_alignment, check_encodings, _stamps, _pairs_of_images,
               _transforms, _tilt, _mount, _pairs_of_boxes, _results)
     found = [finding for check in checks for finding in check(seen)]

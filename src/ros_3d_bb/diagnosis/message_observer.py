@@ -59,7 +59,6 @@ class EdgeObserver(object):
         return []
 
     def faults(self):
-        """Return the fields of Observations with the results of `EdgeComparison.fault`."""
         return {'edges_fault': self._edges.fault(), 'edges_together': self._edges_together.fault()}
 
     def _compare(self, one, other):

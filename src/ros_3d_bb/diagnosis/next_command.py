@@ -75,7 +75,6 @@ def _color_option(reading, seen):
 
 
 def _reading(seen):
-    """Return the Reading with which the bag was observed."""
     names = {stream.role.name: stream.topic for stream in seen.streams.values() if stream.count}
     if seen.depth_is_raw:
         names[DEPTH_TOPICS[RAW][1]] = seen.depth_info_topic
@@ -134,7 +133,6 @@ def _pose_of_other_frame(tf, target):
 
 
 def _pose_in_frame(frame_id, target, reason):
-    """Return the Pose with which a frame replaces that of the images."""
     options = '%s --bbox3d-params %s --detector-params %s' % (target, FRAME_FILE, FRAME_FILE)
     preparation = 'echo %s > %s && ' % (quote('frame_id: ' + frame_id), FRAME_FILE)
     return Pose(options, '; %s is %s' % (frame_id, reason), preparation)

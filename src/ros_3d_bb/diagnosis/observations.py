@@ -7,8 +7,6 @@ KEPT = 1000  # stamps per topic
 
 
 class Role(NamedTuple):
-    """A topic of the pipeline."""
-
     title: str  # content of the topic
     name: str  # in the nodes, before remapping
     kind: str
@@ -23,8 +21,6 @@ class Role(NamedTuple):
 
 
 class Publisher(NamedTuple):
-    """A node that publishes a topic."""
-
     node: str
     problem: str = ''  # why it cannot be received here
     fix: str = ''
@@ -108,7 +104,6 @@ class Finding(NamedTuple):
 
     @property
     def lines(self):
-        """The finding as printed lines."""
         if self.fault:
             return ['wrong  %s: %s' % (self.subject, self.fault), '       fix: %s' % self.fix]
         return ['ok     %s: %s' % (self.subject, self.fact)]

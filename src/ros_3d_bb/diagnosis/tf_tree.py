@@ -36,12 +36,10 @@ def links_in(text):
 
 
 def frames_in(links):
-    """All frames in {frame: Link}, as a set."""
     return set(links).union(link.parent for link in links.values())
 
 
 def root_of(links, frame):
-    """The root of the tree of a frame; `links` is {frame: Link}."""
     return path_to_root({child: link.parent for child, link in links.items()}, frame)[-1]
 
 

@@ -51,7 +51,6 @@ class Stamps(object):
         self._offset_ns, self._last_ns = None, None
 
     def stamp_ns(self, timestamp_ms, is_camera_clock, now_ns):
-        """Stamp of an image that arrived at `now_ns`."""
         integer_ms = int(timestamp_ms)
         time_ns = integer_ms * (NS // 1000) + int(round((timestamp_ms - integer_ms) * NS / 1000))
         if not is_camera_clock:
@@ -197,7 +196,6 @@ def frame_links(prefix, link_from_color_body):
 
 
 def optical_frame(prefix, stream):
-    """Name of the optical frame of a stream, color or depth. The prefix may be empty."""
     return '%s_%s_optical_frame' % (prefix, stream)
 
 

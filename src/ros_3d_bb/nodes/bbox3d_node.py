@@ -164,7 +164,6 @@ class SampleImages(object):
                 self._color_pub.publish(fill_image(Image(header=header), image, 'rgb8'))
 
     def _subscribe(self, wanted):
-        """Subscribe to colour images or unsubscribe from them."""
         patient_master().getPid()  # raises if there is no master, for which rospy would hold a lock, even at Ctrl-C
         if wanted and self._unsubscribe is None:
             self._unsubscribe = subscribe(COLOR_TOPIC, Image, self._on_color, KEPT_AT_ONCE)

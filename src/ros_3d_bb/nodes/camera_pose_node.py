@@ -17,8 +17,6 @@ from ros_3d_bb.pipeline.camera_pose import POSE_FITTED, POSE_TEXT, CameraPoseSta
 
 @parameters()
 class CameraPoseParams(NamedTuple):
-    """Parameters of camera_pose_node."""
-
     frame_world: str = Param('map')
     frame_id: str = Param('')
     image_rotation: str = IMAGE_ROTATION

@@ -25,8 +25,6 @@ PERIOD_S = 0.05  # between commands; chosen: that of move_base's controller
 
 @parameters()
 class FollowNodeParams(NamedTuple):
-    """Parameters of follow_node, beside those of Follower."""
-
     output: str = Param(CMD_VEL, choices=(CMD_VEL, GOAL))
     enabled: bool = Param(False)
     robot_frame: str = ROBOT_FRAME

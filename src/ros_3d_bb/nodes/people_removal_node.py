@@ -1,49 +1,44 @@
-"""ROS node that removes tracked people from laser scans, point clouds and depth images."""
+"""ROS node that removes tracked people from laser scans and point clouds."""
 import functools
 from typing import NamedTuple
 
 import numpy as np
 import rospy
 import tf2_ros
-from sensor_msgs.msg import Image, LaserScan, PointCloud2
+from sensor_msgs.msg import LaserScan, PointCloud2
 
 from ros_3d_bb.camera.camera_model import transform_points
-from ros_3d_bb.conversions.camera_msgs import uncompressed
-from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
-from ros_3d_bb.conversions.perception_msgs import camera_from_msg, stamp_of, time_from
-from ros_3d_bb.conversions.range_msgs import cloud_without, depth_without, points_of_cloud, scan_without
-from ros_3d_bb.core.params import DEPTH_SCALE, TRACKS_TIMEOUT, Param, parameters
+from ros_3d_bb.conversions.perception_msgs import stamp_of, time_from
+from ros_3d_bb.conversions.range_msgs import cloud_without, points_of_cloud, scan_without
+from ros_3d_bb.core.params import TRACKS_TIMEOUT, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.latest_tracks import LatestTracks
 from ros_3d_bb.nodes.common.startup import read_params
-from ros_3d_bb.nodes.common.subscribers import subscribe, subscribe_camera_info
+from ros_3d_bb.nodes.common.subscribers import subscribe
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
-from ros_3d_bb.planning.people_removal import are_inside, cylinders_of, pixels_inside, scan_parts, scan_points
+from ros_3d_bb.planning.people_removal import are_inside, cylinders_of, scan_parts, scan_points
 
-KINDS = {'scan': LaserScan, 'points': PointCloud2, 'depth': Image}
+KINDS = {'scan': LaserScan, 'points': PointCloud2}
 
 
 @parameters()
 class PeopleRemovalParams(NamedTuple):
-    """Parameters of people_removal_node."""
-
     inputs: list = Param(('scan',), choices=tuple(KINDS))
     timeout: float = TRACKS_TIMEOUT
     margin: float = Param(
         0.2, 'Measurements up to this distance from the body of a person, in addition to the standard deviation of the '
         'predicted position, are removed.', 'm', limits=(0.0, 2.0))
-    depth_scale: float = DEPTH_SCALE
     tf_timeout: float = Param(0.1, 'How long to wait for the transform at the stamp of the measurements.', 's')
 
 
 class PeopleRemovalNode(object):
-    """Remove tracked people from laser scans, point clouds and depth images.
+    """Remove tracked people from laser scans and point clouds.
 
     The outputs are for costmaps, SLAM and localisation, which take people for obstacles that stay. People are where
     their tracks predict them at the time of the measurements, in scans with a time_increment that of each beam, and
-    reach the floor. Without tracks for ~timeout, a transform, or the camera_info of depth images, measurements pass as
-    they are, and so do those of another layout.
+    reach the floor. Without tracks for ~timeout or a transform, measurements pass as they are, and so do those of
+    another layout.
     Parameters: config/people_removal.yaml.
 
     Subscribes
@@ -52,10 +47,6 @@ class PeopleRemovalNode(object):
         Planar laser scan; with ~inputs scan.
     ~points : sensor_msgs/PointCloud2
         Point cloud with x, y and z as FLOAT32; with ~inputs points.
-    ~depth : sensor_msgs/Image
-        Depth image; with ~inputs depth.
-    ~camera_info : sensor_msgs/CameraInfo
-        Calibration of the depth image; with ~inputs depth.
     /tf,/tf_static : tf2_msgs/TFMessage
         Poses of the sensors in the frame of the tracks.
 
@@ -65,33 +56,24 @@ class PeopleRemovalNode(object):
         The scan with NaN (REP 117: invalid) in place of people, which neither marks nor clears.
     ~points_static : sensor_msgs/PointCloud2
         The cloud without people; NaN in place of them if it is organised.
-    ~depth_static : sensor_msgs/Image
-        The depth image with invalid pixels in place of people.
     """
 
     def __init__(self):
         params, = read_params(PeopleRemovalParams)
         if not params.inputs:
             raise ValueError('parameter ~inputs is empty; some of %s expected' % ', '.join(KINDS))
-        self._params, self._camera = params, None
+        self._params = params
         self._diagnostics, self._transforms = Diagnostics(), Transforms(params.tf_timeout)
         self._diagnostics.show('tf age', self._transforms.age)
         self._tracks = LatestTracks(self._diagnostics, params.timeout)
-        removers = {'scan': self._without_in_scan, 'points': self._without_in_cloud, 'depth': self._without_in_depth}
+        removers = {'scan': self._without_in_scan, 'points': self._without_in_cloud}
         self._pubs = {name: rospy.Publisher('~%s_static' % name, KINDS[name], queue_size=2) for name in params.inputs}
-        if 'depth' in params.inputs:
-            subscribe_camera_info('~camera_info', '~depth', self._on_camera_info, 1)
         for name in params.inputs:
             subscribe('~' + name, KINDS[name], functools.partial(self._on_message, name, removers[name]), 2)
-
-    def _on_camera_info(self, message):
-        with self._diagnostics.receiving('camera_info'):
-            self._camera = camera_from_msg(message)
 
     def _on_message(self, name, remover, message):
         with self._diagnostics.receiving(name):
             if self._pubs[name].get_num_connections():
-                message = uncompressed(message) if name == 'depth' else message
                 self._pubs[name].publish(self._without_people(name, remover, message))
 
     def _without_people(self, name, remover, message):
@@ -140,10 +122,3 @@ class PeopleRemovalNode(object):
         fixed_from_sensor, cylinders = around()
         points_m = transform_points(fixed_from_sensor, points_of_cloud(message))
         return cloud_without(message, are_inside(points_m, cylinders))
-
-    def _without_in_depth(self, message, around):
-        depth = imgmsg_to_depth(message, self._params.depth_scale, check_unit=True)
-        if self._camera is None or depth.shape != (self._camera.height, self._camera.width):
-            raise ValueError('there is no camera_info with its size, %d x %d' % depth.shape[::-1])
-        fixed_from_sensor, cylinders = around()
-        return depth_without(message.header, depth, pixels_inside(depth, self._camera, fixed_from_sensor, cylinders))

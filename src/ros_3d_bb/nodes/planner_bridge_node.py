@@ -26,8 +26,6 @@ MAX_ROUNDING_M = 0.005  # largest rounding error of a coordinate: a tenth of a t
 
 @parameters()
 class PlannerBridgeParams(NamedTuple):
-    """Parameters of planner_bridge_node."""
-
     outputs: list = Param(('costmap',), choices=NAMES)
     planner_frame: str = Param('')
     robot_frame: str = Param('base_link')

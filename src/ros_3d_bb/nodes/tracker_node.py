@@ -13,7 +13,6 @@ from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.core.time_sync import arrival_clock_ns
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
-from ros_3d_bb.nodes.common.master import on_new_master
 from ros_3d_bb.nodes.common.reconfigure_server import ReconfigureServer
 from ros_3d_bb.nodes.common.startup import Part, read_params
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscribe_camera_info
@@ -114,7 +113,6 @@ class TrackerNode(object):
             self._stage.views[camera_name].add_depth(message, arrival_clock_ns())
 
     def on_frame(self, message, depth_msg):
-        """Process the 3D boxes and the depth image of a frame."""
         if self._uses_depth:
             self._on_depth(depth_msg, '')
         self._on_boxes(message)
@@ -149,7 +147,6 @@ class TrackIdReservation(object):
             raise ValueError('parameter %s is %r; the largest track ID so far expected' % (self._name, self.last_id))
         self._reserved = self.last_id + RESERVED_IDS
         rospy.set_param(self._name, self._reserved)
-        on_new_master(lambda: self._worker.offer(self._reserved))
         # In a separate thread, because an unresponsive master must not block the tracks.
         self._worker = NewestWorker(self._store, self._on_error)
 

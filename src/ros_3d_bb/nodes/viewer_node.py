@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import rospy
 import tf2_ros
-from sensor_msgs.msg import Image, Joy
+from sensor_msgs.msg import Image
 from std_msgs.msg import Empty, Int32MultiArray
-from std_srvs.srv import SetBool, Trigger, TriggerResponse
+from std_srvs.srv import Trigger, TriggerResponse
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC, DEPTH_TOPIC, INFO_TOPICS
 from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth, imgmsg_to_rgb
@@ -20,28 +20,25 @@ from ros_3d_bb.core.params import DEPTH_SCALE, STAMP_TOLERANCE, Param, parameter
 from ros_3d_bb.core.time_sync import NS, arrival_clock_ns
 from ros_3d_bb.msg import BoundingBox3DArray
 from ros_3d_bb.nodes.common.diagnostics import Diagnostics
-from ros_3d_bb.nodes.common.label import Label
+from ros_3d_bb.nodes.common.master import NO_ANSWER
 from ros_3d_bb.nodes.common.startup import read_params
 from ros_3d_bb.nodes.common.subscribers import KEPT_AT_ONCE, subscribe, subscribe_camera_info
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from ros_3d_bb.pipeline.transform_buffer import upright_transform
 from ros_3d_bb.sessions.burst import Burst
 from ros_3d_bb.sessions.snapshots import ColorImage, Snapshots
-from ros_3d_bb.sessions.session_writer import append, remove
+from ros_3d_bb.sessions.session_writer import append
 from ros_3d_bb.visualization.cv_window import Window
 from ros_3d_bb.visualization.image_overlay import DEPTH_RANGE_M
 from ros_3d_bb.visualization.viewer_layout import FrameRate, compose, draw_countdown, text_image
 
 CAMERA_INFO_TOPIC = INFO_TOPICS[0]
-ENABLE_SERVICE = 'detector/enable'
-KEYS = 'keys: s save    t timer    d delete the last one    l label    p pause the detector    q quit'
+KEYS = 'keys: s save    t timer    q quit'
 TIMER_PERIOD_S = 0.1
 
 
 @parameters()
 class ViewerParams(NamedTuple):
-    """Parameters of viewer_node."""
-
     session: str = Param('')
     label: str = Param('')
     window: bool = Param(True)
@@ -62,7 +59,6 @@ class ViewerParams(NamedTuple):
     timer_delay: float = Param(5.0, 'Countdown of the timer before its first measurement.', 's')
     timer_count: int = Param(3, 'Number of measurements of the timer.', limits=(1, 1000))
     timer_interval: float = Param(1.0, 'Time between the measurements of the timer.', 's')
-    joy_button: int = Param(0, 'Index of the joystick button that starts or cancels the timer.')
 
 
 class ViewerNode(object):
@@ -84,8 +80,6 @@ class ViewerNode(object):
         3D boxes.
     ~timer : std_msgs/Empty
         Starts the timer, as the key `t` does: a countdown and a burst of measurements. A second message cancels it.
-    joy : sensor_msgs/Joy
-        Joystick, such as a presenter on the floor mark: a button starts the timer.
     /tf,/tf_static : tf2_msgs/TFMessage
         Transform from ~floor_frame to the camera, whose tilt is stored; not used if ~floor_frame is empty.
 
@@ -94,13 +88,6 @@ class ViewerNode(object):
     ~capture : std_srvs/Trigger
         Appends the newest image and its boxes to the session, as the key `s` does. The response names the stored
         measurement or the reason for the failure.
-    ~delete_last : std_srvs/Trigger
-        Deletes the newest measurement that was stored since the start of the node, as the key `d` does.
-
-    Calls
-    -----
-    detector/enable : std_srvs/SetBool
-        Pauses and resumes the detector, by the key `p`.
     """
 
     def __init__(self):
@@ -113,16 +100,13 @@ class ViewerNode(object):
         self._transforms = Transforms(wait_s=0) if self._params.floor_frame else None
         self._lock, self._capture_lock = threading.Lock(), threading.Lock()
         self._rate, self._received_topics, self._answer = FrameRate(), set(), ''
-        self._captured_ns, self._is_warned, self._is_paused = None, False, False
-        self._label, self._diagnostics = Label(self._params.label), Diagnostics()
-        self._stored_ids, self._is_pressed = [], False
+        self._captured_ns, self._is_warned = None, False
+        self._label, self._diagnostics = self._params.label, Diagnostics()
         self._burst = Burst(self._params.timer_delay, self._params.timer_count, self._params.timer_interval)
-        for name, action in (('~capture', self.capture), ('~delete_last', self.delete_last)):
-            rospy.Service(name, Trigger, lambda _request, action=action: TriggerResponse(*action()))
+        rospy.Service('~capture', Trigger, lambda _request: TriggerResponse(*self.capture()))
         rospy.Timer(rospy.Duration(TIMER_PERIOD_S), self._on_timer, reset=True)
-        # not recorded as inputs, whose silence would be reported
+        # not recorded as an input, whose silence would be reported
         rospy.Subscriber('~timer', Empty, lambda _message: self._burst.toggle(time.monotonic()), queue_size=1)
-        rospy.Subscriber('joy', Joy, self._on_joy, queue_size=10)
         for topic, kind, callback in ((BOXES3D_TOPIC, BoundingBox3DArray, self._on_boxes3d),
                                       (BOXES_TOPIC, Int32MultiArray, self._on_boxes2d),
                                       (DEPTH_TOPIC, Image, self._on_depth), (COLOR_TOPIC, Image, self._on_color)):
@@ -170,12 +154,6 @@ class ViewerNode(object):
             self._snapshots.add_boxes3d(stamp_of(message), arrival_clock_ns(), tuple(boxes.values()))
             self._is_warned = False
 
-    def _on_joy(self, message):
-        button = self._params.joy_button
-        was_pressed, self._is_pressed = self._is_pressed, any(message.buttons[button:button + 1])
-        if self._is_pressed and not was_pressed:
-            self._burst.toggle(time.monotonic())
-
     def _on_timer(self, _event):
         if self._burst.is_due(time.monotonic()):
             is_stored, _answer = self.capture()
@@ -187,29 +165,15 @@ class ViewerNode(object):
 
     def capture(self):
         """Append the newest image and its boxes to the session. Returns whether it was stored, and a message."""
-        return self._change_session(self._stored, 'saved')
-
-    def delete_last(self):
-        """Delete the newest measurement that this node has stored. Returns whether it was deleted, and a message."""
-        return self._change_session(self._deleted, 'deleted')
-
-    def _change_session(self, change, what):
         with self._capture_lock:
             try:
-                done, self._answer = True, change()
+                done, self._answer = True, self._stored()
                 rospy.loginfo('%s', self._answer)
-                self._diagnostics.count('measurements %s' % what)
+                self._diagnostics.count('measurements saved')
             except (ValueError, OSError) as error:
-                done, self._answer = False, 'not %s: %s' % (what, error)
-                self._diagnostics.warn('measurements not %s' % what, self._answer)
+                done, self._answer = False, 'not saved: %s' % error
+                self._diagnostics.warn('measurements not saved', self._answer)
             return done, self._answer
-
-    def _deleted(self):
-        """Delete the newest measurement of this node and return a message. Raises ValueError or OSError on failure."""
-        if not self._stored_ids:
-            raise ValueError('no measurement was stored since the start')
-        remove(self._params.session, self._stored_ids[-1])
-        return 'deleted %s' % self._stored_ids.pop()
 
     def _stored(self):
         """Store the newest snapshot and return a message about it. Raises ValueError or OSError on failure."""
@@ -217,14 +181,19 @@ class ViewerNode(object):
             raise ValueError('no session is given; start the viewer with session:=FOLDER')
         snapshot = self._snapshot_to_store()
         snapshot = snapshot._replace(up=self._up_in(snapshot.color.frame_id))
-        label = self._label.from_master()
+        label = self._read_label()
         name, count = append(self._params.session, snapshot, label)
         self._captured_ns = snapshot.stamp_ns
-        self._stored_ids.append(name)
         found = ('without 3D boxes' if snapshot.boxes3d is None else
                  'with %d 3D box%s' % (len(snapshot.boxes3d), '' if len(snapshot.boxes3d) == 1 else 'es'))
         return 'saved %s %s%s: number %d in %s' % (name, found, label and ', label %s' % label, count,
                                                    self._params.session)
+
+    def _read_label(self):
+        """Return the parameter ~label, as it was last known without a master."""
+        with contextlib.suppress(*NO_ANSWER):
+            self._label = str(rospy.get_param_cached('~label', self._params.label))
+        return self._label
 
     def _up_in(self, frame_id):
         """Return the unit vector (3,) that points up, in a frame; None if it is unknown."""
@@ -258,41 +227,20 @@ class ViewerNode(object):
             return 'no messages received on %s' % ', '.join(missing)
         return 'no depth image with the stamp of a colour image received on %s' % rospy.resolve_name(DEPTH_TOPIC)
 
-    def pause_or_resume(self):
-        """Pause or resume the detector, and show the result in the window."""
-        try:
-            answer = rospy.ServiceProxy(ENABLE_SERVICE, SetBool)(self._is_paused)
-        except rospy.ServiceException as error:
-            self._answer = 'the detector cannot be paused: the service %s does not respond (%s)' % (
-                rospy.resolve_name(ENABLE_SERVICE), error)
-            rospy.logwarn('%s', self._answer)
-            return
-        self._answer = answer.message
-        if answer.success:
-            self._is_paused = not self._is_paused
-            self._is_warned = self._is_paused  # the user paused the detector and expects no boxes
-
     def run(self):
         """Show the window until it is closed or ROS shuts down. Runs in the main thread, which must not publish."""
         if self._window is None:
             rospy.spin()
             return
         with ThreadPoolExecutor(1) as others:  # on exit, waits for measurements that are being stored
-            actions = {'s': self.capture, 'd': self.delete_last, 'p': self.pause_or_resume,
-                       't': lambda: self._burst.toggle(time.monotonic()), 'l': self._label.start_typing}
+            actions = {'s': self.capture, 't': lambda: self._burst.toggle(time.monotonic())}
             shown, key = None, ''
             while not (rospy.is_shutdown() or key == 'q' or self._window.is_closed):
                 due_s = time.monotonic() + 1 / self._params.window_rate
                 shown = self._show(shown)
-                key = self._window.key(max(1, int(1000 * (due_s - time.monotonic()))))
-                if self._label.typed is not None:
-                    self._label.type(key)
-                    key = ''
-                key = key.lower()  # with Caps Lock, too
+                key = self._window.key(max(1, int(1000 * (due_s - time.monotonic())))).lower()  # with Caps Lock, too
                 if key in actions:
                     others.submit(actions[key]).add_done_callback(_complain)
-            if self._is_paused and not rospy.is_shutdown():
-                others.submit(self.pause_or_resume)
         self._window.close()
         if not rospy.is_shutdown():
             rospy.signal_shutdown('the window was closed')
@@ -305,12 +253,9 @@ class ViewerNode(object):
         if snapshot is None:
             self._window.show(text_image((KEYS,), (self._why_nothing(),), 3 * self._params.panel_width))
             return None
-        label = self._label.from_cache()
-        if self._label.typed is not None:
-            label = '%s_ (Enter sets it, Esc cancels)' % self._label.typed
-        countdown = self._burst.text(time.monotonic())
+        label, countdown = self._read_label(), self._burst.text(time.monotonic())
         content = (snapshot.stamp_ns, snapshot.boxes2d, snapshot.boxes3d is None, rate_hz == 0, self._answer,
-                   self._is_paused, label, countdown)
+                   label, countdown)
         if content == shown:
             return shown
         lines = ('%.1f images/s    stamp %d.%09d    %s' % ((rate_hz,) + divmod(snapshot.stamp_ns, NS) + (
@@ -323,9 +268,7 @@ class ViewerNode(object):
         return content
 
     def _warnings(self, snapshot, is_early, rate_hz):
-        if self._is_paused:
-            yield 'the detector is paused'
-        elif snapshot.boxes3d is None and not is_early:
+        if snapshot.boxes3d is None and not is_early:
             yield 'no 3D boxes on %s' % rospy.resolve_name(BOXES3D_TOPIC)
         if rate_hz == 0:
             yield 'no new images on %s' % rospy.resolve_name(COLOR_TOPIC)

@@ -58,7 +58,6 @@ class CameraPipeline(object):
         return frame.received.color, received, frame, depth_msg
 
     def estimate(self, boxes2d_msg: Int32MultiArray, frame: RgbdFrame, depth_msg: Image) -> None:
-        """Process the published 2D boxes of a detection."""
         if not self._has_estimator:
             return
         with self._events.receiving('2D boxes'):

@@ -59,7 +59,6 @@ class CameraPoseStage(object):
 
     @property
     def is_complete(self) -> bool:
-        """Whether `IMAGES` images show the floor."""
         return len(self._floors) >= IMAGES
 
     @property

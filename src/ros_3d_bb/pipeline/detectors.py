@@ -33,7 +33,7 @@ class Row(NamedTuple):
 
 
 DETECTORS = {
-    'yolov5': Row(NetworkPeople, (DetectionParams, RuntimeParams), suffixes=('.pt', '.torchscript', '.onnx'),
+    'yolov5': Row(NetworkPeople, (DetectionParams, RuntimeParams), suffixes=('.pt', '.onnx'),
                   for_bags={'device': 'cpu', 'threads': 1}),
     'depth': Row(DepthDetector, (DepthPeopleParams,), uses_depth=True)}
 
@@ -62,5 +62,4 @@ def open_named(events: EventCounter, params: DetectorParams, *own: Any) -> Detec
 
 
 def without_weights() -> List[str]:
-    """The names of the detectors that need no weights."""
     return [name for name, row in DETECTORS.items() if not row.suffixes]

@@ -33,8 +33,6 @@ _level_rotation = functools.lru_cache(maxsize=16)(level_rotation)
 
 @parameters()
 class Bbox3dParams(NamedTuple):
-    """Parameters of bbox3d_node."""
-
     estimator: str = Param(
         'foreground', 'How a position is estimated from the depth in a box. foreground: from the nearest layer of '
         'depth that is large enough to be the person, whatever is behind them. median: as in the thesis, the median '

@@ -28,7 +28,6 @@ class IgnoredPlaces(object):
         return areas.differs_from(before)
 
     def use_map(self, cells: OccupiedCells) -> bool:
-        """Use the cells of a map. Returns whether there was none before."""
         before, self._areas = self._areas, self._areas._replace(occupied=cells)
         return before.occupied is None
 

@@ -61,7 +61,6 @@ class Settings(NamedTuple):
 
     @property
     def inputs(self) -> Set[str]:
-        """The topics of `INPUTS` that are used."""
         unused = {COLOR_TOPIC if self.detector == NONE else BOXES_TOPIC}
         if self.bbox3d[0].depth != RAW:
             unused.add(DEPTH_INFO_TOPIC)
@@ -76,7 +75,6 @@ class Settings(NamedTuple):
 
     @property
     def uses_depth(self) -> bool:
-        """Whether there is a detector that uses depth."""
         return self.detector != NONE and row_named(self.detector).uses_depth
 
     @property

@@ -54,17 +54,14 @@ class RgbdSource(object):
         self._held: Optional[Tuple[Stamped, Stamped, Camera]] = None
 
     def set_assumed_delay(self, delay_s: float) -> None:
-        """Set the latency of the detector, for 2D boxes without a stamp."""
         self._sync.assumed_delay_ns = int(delay_s * NS)
 
     def add_camera_info(self, message: CameraInfo, now_ns: int) -> None:
-        """Add a sensor_msgs/CameraInfo of the colour camera."""
         camera = camera_from_msg(message)
         self._color_frame = message.header.frame_id
         self._sync.add_camera(stamp_if_any(message), now_ns, camera)
 
     def add_depth_camera_info(self, message: CameraInfo, _now_ns: int) -> None:
-        """Add a sensor_msgs/CameraInfo of the depth camera, for raw depth."""
         self._registration.add_camera_info(message)
 
     def add_depth(self, message: Image, now_ns: int) -> None:

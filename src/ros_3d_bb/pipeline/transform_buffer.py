@@ -17,7 +17,6 @@ MOST_RECENT = 1000  # recent transforms that are kept; chosen: some seconds of /
 
 
 def path_to_root(parents: Mapping[str, str], frame: str) -> List[str]:
-    """The frame and its ancestors, the root last; `parents` is {frame: parent}."""
     path = [frame]
     while path[-1] in parents and parents[path[-1]] not in path:
         path.append(parents[path[-1]])
@@ -62,7 +61,6 @@ class TransformBuffer(tf2_ros.BufferCore):
         self._recent: Deque[Tuple[TransformStamped, str]] = collections.deque(maxlen=MOST_RECENT)  # also rejected ones
 
     def set_transform(self, transform: TransformStamped, authority: str) -> None:
-        """Add a TransformStamped."""
         child, stamp_s = _child_of(transform), transform.header.stamp.to_sec()
         newest_s = self._newest_s[child] = max(stamp_s, self._newest_s.get(child, stamp_s))
         if stamp_s < newest_s - CACHE_S:
@@ -75,12 +73,10 @@ class TransformBuffer(tf2_ros.BufferCore):
         tf2_ros.BufferCore.set_transform(self, transform, authority)
 
     def set_transform_static(self, transform: TransformStamped, authority: str) -> None:
-        """Add a TransformStamped of tf_static."""
         self._parents[_child_of(transform)] = transform.header.frame_id.lstrip('/')
         tf2_ros.BufferCore.set_transform_static(self, transform, authority)
 
     def clear(self) -> None:
-        """Remove all transforms except static ones."""
         tf2_ros.BufferCore.clear(self)
         self._start()
 
@@ -97,7 +93,6 @@ class TransformBuffer(tf2_ros.BufferCore):
         return transform_from_msg(self.lookup_transform_core(target, source, stamp))
 
     def ancestors(self, frame: str) -> List[str]:
-        """The frame and its ancestors, the root last."""
         return path_to_root(self._parents, frame.lstrip('/'))
 
     def forget_later(self, target_frame: str, source_frame: str) -> None:

@@ -31,8 +31,6 @@ SLOWEST_MPS = 0.1  # speed from which the path counts in which the robot starts 
 
 @parameters('following')
 class FollowParams(NamedTuple):
-    """Parameters of Follower."""
-
     track_id: int = Param(
         0, 'Track ID of the person to follow; 0: the nearest visible person.', limits=(0, 2 ** 31 - 1),
         live=(0, 100000))
@@ -147,7 +145,6 @@ class TargetSelector(object):
             self._path.append(own)
 
     def _has_changed(self, stamp_ns):
-        """Whether the ID of the target has changed within the last PATH_NS."""
         return self._changed_ns is not None and stamp_ns - self._changed_ns <= PATH_NS
 
     def _before_hidden(self, track_id):
@@ -220,7 +217,6 @@ class Follower(object):
         self._params, self._safety = params, safety
 
     def restart(self):
-        """Forget the person, and stand still."""
         self.selector, self.person, self._velocity = TargetSelector(), None, (0.0, 0.0)
 
     def update(self, tracks, stamp_ns, robot_from_tracks):
@@ -248,7 +244,6 @@ class Follower(object):
         return self._velocity
 
     def stop(self):
-        """Stand still at once."""
         self._velocity = (0.0, 0.0)
 
     def goal(self, age_s, robot_from_tracks):

@@ -1,13 +1,9 @@
 """Which measurements of other sensors show tracked people. Metres."""
-import functools
-
 import numpy as np
 
-from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.core.object_classes import PERSON, PERSON_CLASS
 from ros_3d_bb.planning.planner_view import covariances_after, position_after
 
-BEHIND_M = 0.05  # smallest depth that is projected
 # Duration of a part of a scan that is taken at one time, chosen: at 1.5 rad/s, half of it is 0.015 rad; and longest
 # duration of a scan: no laser is as slow.
 PART_S, LONGEST_SCAN_S = 0.02, 1.0
@@ -57,37 +53,3 @@ def scan_parts(count, increment_s):
     length = max(int(PART_S / increment_s), 1)
     return [(slice(first, first + length), (first + (min(length, count - first) - 1) / 2) * increment_s)
             for first in range(0, count, length)]
-
-
-def pixels_inside(depth, camera, fixed_from_camera, cylinders):
-    """Which pixels of a DepthImage of a Camera show points in the cylinders of the fixed frame, bool (h, w)."""
-    found = np.zeros(depth.shape, bool)
-    x, y = _rays_of(camera)
-    for cylinder in cylinders:
-        part = _image_part(camera, np.linalg.inv(fixed_from_camera), cylinder)
-        depth_m = depth.values[part] * depth.scale_m
-        points_m = np.stack((x[part] * depth_m, y[part] * depth_m, depth_m), axis=-1)
-        found[part] |= are_inside(transform_points(fixed_from_camera, points_m), [cylinder]) & (depth_m > 0)
-    return found
-
-
-@functools.lru_cache(maxsize=4)
-def _rays_of(camera):
-    """`Camera.rays` of all pixels, (h, w) each. With lens distortion, they take much longer than the rest."""
-    return np.broadcast_arrays(*camera.rays(np.arange(camera.width), np.arange(camera.height)[:, np.newaxis]))
-
-
-def _image_part(camera, camera_from_fixed, cylinder):
-    """Slices of the rows and columns that contain a cylinder; the whole image if it reaches behind the camera."""
-    x, y, radius_m, low_m, high_m = cylinder
-    corners_m = np.array([(x + dx, y + dy, z) for dx in (-radius_m, radius_m) for dy in (-radius_m, radius_m)
-                          for z in (low_m, high_m)])
-    corners_m = transform_points(camera_from_fixed, corners_m)
-    if corners_m[:, 2].max() < BEHIND_M:
-        return slice(0, 0), slice(0, 0)
-    pixels = camera.project(corners_m)
-    if corners_m[:, 2].min() < BEHIND_M or not np.isfinite(pixels).all():
-        return slice(None), slice(None)
-    (left, top), (right, bottom) = np.floor(pixels.min(axis=0)), np.ceil(pixels.max(axis=0)) + 1
-    return (slice(int(np.clip(top, 0, camera.height)), int(np.clip(bottom, 0, camera.height))),
-            slice(int(np.clip(left, 0, camera.width)), int(np.clip(right, 0, camera.width))))

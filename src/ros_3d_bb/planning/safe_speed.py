@@ -20,8 +20,6 @@ LEAST_ROOM_M, LEAST_WIDTH_M = 0.5, 0.35
 
 @parameters('safe speed')
 class SafeSpeedParams(NamedTuple):
-    """Parameters of `highest_safe_speed`."""
-
     robot_radius: float = Param(
         0.35, 'Radius of the robot around the origin of its frame.', 'm', limits=(0.05, 5.0))
     reaction_time: float = Param(
@@ -40,8 +38,6 @@ class SafeSpeedParams(NamedTuple):
 
 @parameters('blind corners')
 class CornerParams(NamedTuple):
-    """Parameters of `speed_before_corners`."""
-
     emerging_speed: float = Param(
         1.4, 'Speed at which people may come from behind a blind corner; the default is the usual speed of walking.',
         'm/s', limits=(0.0, 5.0), live=(0, 3))

@@ -15,7 +15,6 @@ class Burst(object):
         return self._left > 0
 
     def toggle(self, now_s):
-        """Start the countdown, or cancel a running one."""
         self._left, self._next_s, self._failed_s = 0 if self.is_active else self._count, now_s + self._delay_s, None
 
     def is_due(self, now_s):

@@ -4,7 +4,7 @@ Positions are (x, z) in the camera optical frame, metres; error = measured - tru
 over the MEASURED position, which a slip in the truth does not move. The line is fitted with Tukey's biweight, so that
 slips among the measurements have no influence on it.
 """
-from typing import NamedTuple, Optional
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,6 @@ GROWTH_OUTSIDE = 0.2  # of the limit, per metre outside the other measurements
 TWICE_THE_VARIANCE_M = 3.0  # range at which stereo noise has doubled the variance of near people
 TUKEY, MAD_TO_SIGMA, LEAST_SIGMA_M, STEPS = 4.685, 1.4826, 0.02, 30
 CONVERGED = 1e-4  # metres, and metres per metre
-FACTORS = (1000.0, 100.0, 10.0, 0.1, 0.01, 0.001)  # of a wrong unit, or of a lost zero
-SLIPS = ((-1.0, 1.0),) + tuple(pair for factor in FACTORS for pair in ((1.0, factor), (factor, 1.0), (factor, factor)))
 
 
 class LikelyErrors(NamedTuple):
@@ -50,12 +48,6 @@ class LikelyErrors(NamedTuple):
         """Whether true positions (..., 2) are plausible for measured positions (..., 2)."""
         deviation_m = np.asarray(measured_m, float) - truth_m - self.at(measured_m)
         return (np.abs(deviation_m) <= self.limit_m(measured_m)).all(axis=-1)
-
-    def corrected_slip(self, measured_m, truth_m):
-        """Plausible position (2,) that differs from an implausible one by a sign, a unit or lost zeros, or None."""
-        candidates_m = np.multiply(SLIPS, truth_m)
-        plausible = self.are_plausible(np.broadcast_to(measured_m, candidates_m.shape), candidates_m)
-        return candidates_m[plausible.argmax()] if plausible.any() else None
 
 
 def likely_errors(measured_m, truth_m):
@@ -106,30 +98,26 @@ def _weighted_median(values, weights):
 
 
 class Outlier(NamedTuple):
-    """Measurement with an implausible truth: its name, measured and true (x, z) in metres, and the plausible position
-    from which the truth differs by a slip, or None."""
+    """Measurement with an implausible truth: its name, measured and true (x, z) in metres."""
 
     name: str
     measured_m: np.ndarray
     truth_m: np.ndarray
-    intended_m: Optional[np.ndarray]
 
     def __str__(self):
         return '%s: %s' % (self.name, self.description)
 
     @property
     def description(self):
-        text = 'the true position %s is implausible, the estimate is %s' % (
+        return 'the true position %s is implausible, the estimate is %s (wrong unit, lost digit or sign?)' % (
             position_text(self.truth_m), position_text(self.measured_m))
-        return text if self.intended_m is None else '%s; %s would be plausible (wrong unit, lost digit or sign?)' % (
-            text, position_text(self.intended_m))
 
 
 def outlier_of(name, likely, measured_m, truth_m):
     """Outlier of a position (x, z), or None if its truth is plausible with these LikelyErrors."""
     if likely.are_plausible(measured_m, truth_m):
         return None
-    return Outlier(name, np.asarray(measured_m), np.asarray(truth_m), likely.corrected_slip(measured_m, truth_m))
+    return Outlier(name, np.asarray(measured_m), np.asarray(truth_m))
 
 
 def outliers_of(names, measured_m, truth_m):

@@ -71,7 +71,6 @@ class Measurement(NamedTuple):
 
     @property
     def level_from_camera(self):
-        """As from `box3d_estimator.level_rotation`."""
         return level_rotation(self.up)
 
     @property
@@ -89,7 +88,6 @@ class Measurement(NamedTuple):
 
     @property
     def name(self):
-        """ID and label."""
         return '%s (%s)' % (self.id, self.label) if self.label else self.id
 
     @property
@@ -113,7 +111,6 @@ class Measurement(NamedTuple):
 
     @property
     def state(self):
-        """NEW, ANNOTATED, REJECTED or NOBODY."""
         if self.rejected is not None:
             return REJECTED
         if not self.detections and self.problem is None:

@@ -60,23 +60,6 @@ def append(folder, snapshot, label=''):
     return entry['id'], len(content['frames'])
 
 
-def remove(folder, name):
-    """Remove the measurement with an ID and its images from the session in a folder.
-
-    Raises ValueError if there is none, or it is annotated, and OSError if the session cannot be written.
-    """
-    with locked_update(folder) as content:
-        entry = next((each for each in content['frames'] if isinstance(each, dict) and each.get('id') == name), None)
-        if entry is None:
-            raise ValueError('%s is no longer in the session' % name)
-        if entry.get('truth_mm') or any(detection.get('truth_mm') for detection in entry.get('detections', ())):
-            raise ValueError('%s is annotated; reject it in the annotator' % name)
-        content['frames'] = [other for other in content['frames'] if other is not entry]
-    for kind in ('color', 'depth'):  # afterwards: frames.json never refers to a missing image
-        with contextlib.suppress(OSError):
-            os.unlink(os.path.join(folder, entry[kind]))
-
-
 @contextlib.contextmanager
 def locked_update(folder):
     """Lock the description of a session in an existing folder, and write it when the block ends without an error.

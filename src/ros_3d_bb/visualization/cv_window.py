@@ -27,7 +27,6 @@ class Window(object):
 
     @property
     def is_closed(self):
-        """Whether the user closed the window."""
         if self._size_px is None:
             return False
         visible = cv2.getWindowProperty(self._title, cv2.WND_PROP_VISIBLE)
@@ -36,7 +35,6 @@ class Window(object):
         return visible < 1
 
     def show(self, picture):
-        """Show an RGB image and resize the window to its size."""
         if picture.shape != self._size_px:
             self._size_px = picture.shape
             cv2.resizeWindow(self._title, picture.shape[1], picture.shape[0])

@@ -14,8 +14,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE
 
 MARKERS_TOPIC = 'visualization_marker_array'
-NAMESPACES = ('cylinder', 'id', 'velocity', 'prediction', 'history', 'ellipse', 'ignored_area', 'field_of_view',
-              'prediction_ellipse')
+NAMESPACES = ('cylinder', 'id', 'velocity', 'prediction', 'history', 'ellipse', 'ignored_area', 'field_of_view')
 BLUE, GREEN, RED = (0.1, 0.3, 1.0), (0.1, 0.9, 0.2), (0.95, 0.1, 0.1)
 AMBER, GREY, WHITE = (1.0, 0.65, 0.1), (0.65, 0.65, 0.65), (0.95, 0.95, 0.95)
 # Neighbours differ most. None is red, green or grey, because arrows and tracks that are not visible have these colours.
@@ -29,13 +28,12 @@ MIN_ARROW_M = 0.05  # RViz cannot orient an arrow without length
 VELOCITY_SCALE, PREDICTION_SCALE = Vector3(0.07, 0.14, 0), Vector3(0.04, 0.11, 0)
 # Height of the text, and widths of the lines.
 TEXT_SCALE, HISTORY_SCALE = Vector3(0, 0, 0.5), Vector3(0.05, 0, 0)
-ELLIPSE_SCALE, PREDICTION_ELLIPSE_SCALE = Vector3(0.03, 0, 0), Vector3(0.015, 0, 0)
+ELLIPSE_SCALE = Vector3(0.03, 0, 0)
 AREA, VIEW = 'ignored_area', 'field_of_view'
 OUTLINE_SCALES = {AREA: Vector3(0.06, 0, 0), VIEW: Vector3(0.03, 0, 0)}
 UPRIGHT = Quaternion(0, 0, 0, 1)
 CHI2_95 = 5.991  # 95 % quantile of chi squared with 2 degrees of freedom: squared semi-axes in standard deviations
 CIRCLE = np.array([(np.cos(angle), np.sin(angle)) for angle in np.linspace(0, 2 * np.pi, 17)])
-ELLIPSES_EVERY_S = 0.5  # along the prediction
 FLOOR_OFFSET_M = 0.02  # avoids flickering of lines in the plane of RViz's grid
 HISTORY_POINTS, HISTORY_SPACING_S = 50, 0.2  # maximum number, minimum distance
 
@@ -45,12 +43,11 @@ class MarkerParams(NamedTuple):
     """Which markers tracker_node publishes, and how they look."""
 
     marker_namespaces: list = Param(
-        NAMESPACES[:-1], 'Kinds of markers, each in a namespace of its own that RViz switches on and off. cylinder; '
-        'id: the track ID, with the class of objects other than people, followed by a question mark while the object '
-        'is not detected; velocity: red, to the position in 1 s; prediction: green, to the last predicted position; '
-        'history: the path walked, fading; ellipse: contains the position with a probability of 95 %; ignored_area: '
-        'where no track starts (ignored_areas); field_of_view: of the camera, on the floor; prediction_ellipse: the '
-        'ellipse at each half second ahead.', choices=NAMESPACES, live=True)
+        NAMESPACES, 'Kinds of markers, each in a namespace of its own that RViz switches on and off. cylinder; id: the '
+        'track ID, with the class of objects other than people, followed by a question mark while the object is not '
+        'detected; velocity: red, to the position in 1 s; prediction: green, to the last predicted position; history: '
+        'the path walked, fading; ellipse: contains the position with a probability of 95 %; ignored_area: where no '
+        'track starts (ignored_areas); field_of_view: of the camera, on the floor.', choices=NAMESPACES, live=True)
     marker_color: str = Param(
         'id', 'Colour of cylinders, history and ellipses. id: one of ten colours by track ID, which shows ID '
         'switches; status: blue for visible, amber for occluded, grey for out of view; thesis: blue. Undetected '
@@ -100,8 +97,7 @@ class MarkerWriter(object):
         self._params = params
         self._lifetime = genpy.Duration.from_sec(params.marker_lifetime)
         shapes = {'cylinder': self._cylinder, 'id': self._id, 'velocity': self._velocity,
-                  'prediction': self._prediction, 'history': self._history, 'ellipse': self._ellipse,
-                  'prediction_ellipse': self._prediction_ellipses}
+                  'prediction': self._prediction, 'history': self._history, 'ellipse': self._ellipse}
         self._shapes = [(name, shape) for name, shape in shapes.items() if name in params.marker_namespaces]
 
     def write(self, tracks, header):
@@ -130,7 +126,6 @@ class MarkerWriter(object):
         return MarkerArray(markers=markers)
 
     def _outline(self, namespace, number, polygon, header):
-        """Closed outline of a polygon on the floor."""
         anchor_m = np.append(polygon[0], FLOOR_OFFSET_M)
         corners = [_point(x, y, 0.0) for x, y in (np.vstack((polygon, polygon[:1])) - polygon[0]).tolist()]
         return Marker(header=header, ns=namespace, id=number, type=Marker.LINE_STRIP, action=Marker.ADD,
@@ -189,16 +184,6 @@ class MarkerWriter(object):
         return _Look(Marker.LINE_STRIP, ELLIPSE_SCALE, _color(self._rgb(track), 0.9),
                      points=self._outlines[track.id])
 
-    def _prediction_ellipses(self, track):
-        if track.prediction_covariance_m2 is None or not len(track.prediction_m):
-            return None
-        stride = max(int(round(ELLIPSES_EVERY_S / track.prediction_step_s)), 1)
-        shown = np.s_[stride - 1::stride]
-        feet_m = track.prediction_m[shown] - track.position_m + _to_foot(track)
-        points = [point for outline in _ellipses(track.prediction_covariance_m2[shown, :2, :2], feet_m)
-                  for ends in zip(outline, outline[1:]) for point in ends]
-        return _Look(Marker.LINE_LIST, PREDICTION_ELLIPSE_SCALE, _color(GREEN, 0.6), points=points) if points else None
-
     def _rgb(self, track):
         if self._params.marker_color == 'status':
             return STATUS_COLORS[track.status]
@@ -206,7 +191,6 @@ class MarkerWriter(object):
 
 
 def _to_foot(track):
-    """Vector from the centre of a track to its foot, just above the floor."""
     return np.array([0, 0, FLOOR_OFFSET_M - track.size_m[2] / 2])
 
 
@@ -257,7 +241,6 @@ def _point(x, y, z):
 
 @functools.lru_cache(maxsize=None)
 def _shades(rgb):
-    """Colour messages by opacity, 0 to 1 in steps of 0.01."""
     return {percentage / 100: _color(rgb, percentage / 100) for percentage in range(101)}
 
 

@@ -104,7 +104,6 @@ def draw_countdown(picture, text):
 
 
 def text_image(lines, warnings, width_px):
-    """Image of lines of text, followed by warnings."""
     rows = [(line, INK) for line in lines] + [(line, WARNING_INK) for line in warnings]
     image = np.full((LINE_PX * max(MIN_TEXT_LINES, len(rows)) + 2 * MARGIN_PX, width_px, 3), PAPER, np.uint8)
     for number, (line, color) in enumerate(rows, 1):

@@ -46,7 +46,6 @@ class PersonScore(NamedTuple):
 
     @property
     def switches(self):
-        """Number of ID switches."""
         return max(0, len(self.ids) - 1)
 
 
@@ -115,7 +114,6 @@ def _person_score(person_id, moments, matches, cameras):
 
 
 def distance_m(one, other):
-    """Distance in the plane."""
     return float(np.hypot(*(np.asarray(one) - other)[:2]))
 
 

@@ -20,7 +20,6 @@ def default_weights():
 
 
 def scenario_path(name):
-    """Path of a scenario, given by its name in config/scenarios or by its path. A type for argparse."""
     shipped = os.path.join(SCENARIOS, name if name.endswith('.yaml') else name + '.yaml')
     for path in (shipped, name):
         if os.path.isfile(path):
@@ -30,12 +29,10 @@ def scenario_path(name):
 
 
 def scenario_paths(pattern):
-    """Paths of the scenarios in config/scenarios whose names match a pattern."""
     return sorted(glob.glob(os.path.join(SCENARIOS, pattern + '.yaml')))
 
 
 def scene_name(path):
-    """Name of the scenario in a file."""
     return os.path.splitext(os.path.basename(path))[0]
 
 
@@ -47,7 +44,6 @@ def add_scenarios(parser, *patterns):
 
 
 def in_range(kind, low, high=float('inf')):
-    """A type for argparse: numbers of a kind, int or float, from `low` to `high`."""
     def converted(text):
         value = kind(text)
         if not low <= value <= high:

@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 
 from ros_3d_bb.detection.boxes import iou
+from ros_3d_bb.detection.network_detector import GREY
 from ros_3d_bb.sessions.session_reader import read_color
 
 NEAREST_M = 1.9  # people of the session that are nearer are cut by the border of the image
-GREY = 114  # around the shrunk image, as in the input of networks
 
 
 def found_at_ranges(frames, camera, networks, ranges_m, found_iou):

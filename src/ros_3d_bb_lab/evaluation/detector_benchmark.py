@@ -18,7 +18,6 @@ from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_sessi
 from ros_3d_bb_lab.evaluation.defaults import data_folder, default_weights, describe_machine, in_range
 from ros_3d_bb_lab.evaluation.detection_ranges import found_at_ranges
 from ros_3d_bb_lab.evaluation.detectors import weight_free_detectors
-from ros_3d_bb_lab.evaluation.progress import with_progress
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb_lab.evaluation.text_table import table_of
 
@@ -45,7 +44,6 @@ def open_networks(paths, confidence, sizes=(0,)):
 
 
 def ignoring_depth(network):
-    """Function of a color and a depth image that returns the Detections of a NetworkDetector."""
     return lambda color, _depth: network.detect(color)
 
 
@@ -60,7 +58,7 @@ def compare(session, detectors):
     frames = annotated_frames(session)
     overlaps, false_boxes, times_ms = ({name: [] for name in detectors} for _result in range(3))
     warm_up = frames[:WARM_UPS]
-    for number, frame in enumerate(with_progress(warm_up + frames)):
+    for number, frame in enumerate(warm_up + frames):
         images = read_color(frame, session.camera), read_depth(frame, session)
         recorded = np.array(frame.boxes_px, float)
         for name, detect in detectors.items():
@@ -95,7 +93,7 @@ def best_confidence(session, network):
     """
     network = network.with_params(DetectionParams(confidence=CONFIDENCES[0], image_size=network.input_px))
     found, false = [], []  # scores of the best detection of each recorded box, and of detections of no recorded box
-    for frame in with_progress(annotated_frames(session)):
+    for frame in annotated_frames(session):
         detections = network.detect(read_color(frame, session.camera))
         overlaps = np.array([iou(box, detections.boxes) for box in np.array(frame.boxes_px, float)])
         is_match = overlaps >= FOUND_IOU

@@ -24,5 +24,4 @@ def detector_of(name, camera):
 
 
 def weight_free_detectors(camera):
-    """The functions of `detector_of` for each detector that needs no weights, by name."""
     return {name: detector_of(name, camera) for name in without_weights()}

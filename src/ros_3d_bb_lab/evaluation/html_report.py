@@ -26,7 +26,6 @@ figcaption::before {{ counter-increment: figure; content: "Figure " counter(figu
 
 
 def html_report(title, elements):
-    """The page of a title and elements."""
     return PAGE.format(title=html.escape(title), body='\n'.join(elements))
 
 
@@ -39,14 +38,12 @@ def paragraph(text):
 
 
 def figure(path, caption):
-    """The figure in an image file (pathlib.Path)."""
     data, caption = base64.b64encode(path.read_bytes()).decode(), html.escape(caption)
     return '<figure><img src="data:%s;base64,%s" alt="%s"><figcaption>%s</figcaption></figure>' % (
         mimetypes.guess_type(path.name)[0], data, caption, caption)
 
 
 def table(caption, header, rows):
-    """Table of text, with the caption above it."""
     lines = [_row('th', header)] + [_row('td', row) for row in rows]
     kind = ' class="pairs"' if len(header) == 2 else ''  # names and values, which may be text
     return '<p class="caption">%s</p>\n<table%s>\n%s\n</table>' % (html.escape(caption), kind, '\n'.join(lines))

@@ -52,7 +52,6 @@ def running(command, **options):
 
 
 def free_port():
-    """TCP port that is not in use."""
     with contextlib.closing(socket.socket()) as probe:
         probe.bind(('localhost', 0))
         return probe.getsockname()[1]

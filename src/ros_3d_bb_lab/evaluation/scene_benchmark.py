@@ -81,7 +81,6 @@ def boxes3d_of(detected, color, depth, camera, fixed_from_camera, error_model=No
 
 
 def view_of(depth, camera, fixed_from_camera, name):
-    """The CameraView of an image of the camera with this name."""
     return CameraView(fixed_from_camera, camera, name, functools.partial(depths_towards, camera, depth))
 
 
@@ -100,12 +99,10 @@ def yolov5_detector(weights):
 
 
 def exact_detector(simulator):
-    """Detector for `run_scene` that returns the boxes of `jittered_boxes`, without scores."""
     return lambda frame: detections_without_scores(jittered_boxes(frame, simulator.camera, simulator.scenario.seed))
 
 
 def detections_without_scores(boxes):
-    """Detections of people whose scores are unknown."""
     return Detections(np.array(boxes, float).reshape(-1, 4), np.zeros(len(boxes)), np.zeros(len(boxes), int))
 
 
@@ -215,7 +212,6 @@ def result_of(steps, detector, camera=D435I_COLOR):
 
 
 def run(arguments):
-    """Run the scenarios with each detector."""
     yolov5, results = yolov5_detector(arguments.weights) if arguments.weights else None, []
     for path in arguments.scenarios:
         results += _run(path, yolov5)

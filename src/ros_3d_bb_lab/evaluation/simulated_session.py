@@ -12,7 +12,6 @@ from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.sessions.session_writer import append, locked_update
 from ros_3d_bb.sessions.snapshots import ColorImage, Snapshot
-from ros_3d_bb_lab.evaluation.progress import with_progress
 from ros_3d_bb_lab.simulation.scenario import Move, Person, Robot, Room, Scenario
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, Simulator
 
@@ -27,7 +26,7 @@ REPETITIONS = 3
 def write_simulated_session(folder, ranges_m=RANGES_M, tangents=TANGENTS, repetitions=REPETITIONS):
     """Write a session of simulated people with exact 2D boxes, except outside the image. Returns the folder."""
     positions_m = [(z_m, round(tangent * z_m, 3)) for z_m in ranges_m for tangent in tangents]
-    for number in with_progress(range(len(positions_m) * repetitions)):
+    for number in range(len(positions_m) * repetitions):
         _append_frame(folder, number, *positions_m[number // repetitions])
     return folder
 

@@ -19,17 +19,15 @@ import numpy as np
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from, transform_points
 from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.detection.network_detector import DetectionParams
 from ros_3d_bb.estimation.box3d import ImageGeometry, plausible
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named
-from ros_3d_bb.sessions.session_reader import read_color, read_depth, read_session
+from ros_3d_bb.sessions.session_reader import read_depth, read_session
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import CameraView, Detection, detections_from_boxes
 from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker
 from ros_3d_bb_lab.evaluation.baselines.published_code import PublishedCode, load_published
-from ros_3d_bb_lab.evaluation.defaults import data_folder, default_weights, describe_machine, in_range
-from ros_3d_bb_lab.evaluation.progress import with_progress
+from ros_3d_bb_lab.evaluation.defaults import data_folder, describe_machine, in_range
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb_lab.evaluation.text_table import line_of, table_of
 
@@ -39,7 +37,6 @@ PERIOD_NS = NS // 30
 FIXED_FROM_CAMERA = transform_from((0.0, 0.0, 1.0), OPTICAL_ROTATION)
 AHEAD_S = 2.0  # horizon of the thesis' prediction
 STAGES = 'estimation', 'tracking', 'both'
-DETECTOR_IMAGES, DETECTOR_WARM_UPS = 40, 2
 COVERED = 0.2  # share of a box that its neighbour covers
 JITTER_PX = 2  # maximum change of the edges of a box between images
 SIMULATED = (2.0, 4.0), (-0.2, 0.2), 2  # simulated session, used if no session is given
@@ -100,11 +97,9 @@ class Ours(object):
         self._view = CameraView(FIXED_FROM_CAMERA, crowd.camera, depth_at=depth_at)
 
     def estimate(self, depth, rects_px):
-        """3D boxes in the frame of the camera."""
         return list(filter(plausible, estimate_boxes(depth, rects_px, self._camera, self._estimator)))
 
     def track(self, stamp_ns, boxes):
-        """Update the tracks with one image. Returns the tracks."""
         detections = detections_from_boxes(dict(enumerate(boxes)), FIXED_FROM_CAMERA)
         return self._tracker.update(stamp_ns, detections, self._view)
 
@@ -121,13 +116,11 @@ class Theirs(object):
         self._camera, self._tracker = crowd.camera, OriginalTracker()
 
     def estimate(self, depth, rects_px):
-        """3D boxes in the frame of the camera."""
         geometry = ImageGeometry(self._camera, (0, 0) + self._camera[:2])
         boxes = estimator_named('median').estimate(depth, rects_px, geometry, None)
         return [box for box in boxes if box is not None]
 
     def track(self, stamp_ns, boxes):
-        """Update the tracks with one image. Returns the predicted positions by ID."""
         detections = [Detection(transform_points(FIXED_FROM_CAMERA, box.center_m), box.size_m) for box in boxes]
         return {track.id: track.position_m + AHEAD_S * track.velocity_mps
                 for track in self._tracker.step(stamp_ns, detections)}
@@ -172,7 +165,7 @@ def _times_ms(crowds, kinds, images, random):
     """CPU times of the images, (images, crowds, algorithms, stages); `kinds` create an algorithm for a crowd."""
     algorithms = [[kind(crowd) for kind in kinds] for crowd in crowds]
     times_ms = np.empty((images + WARM_UPS, len(crowds), len(kinds), len(STAGES)))
-    for image in with_progress(range(len(times_ms))):
+    for image in range(len(times_ms)):
         for number, crowd in enumerate(crowds):
             rects_px = crowd.jittered(random)
             for turn in range(len(kinds)):
@@ -191,59 +184,22 @@ def _time_ms(algorithm, depth, rects_px, stamp_ns):
     return 1e3 * (between_s - start_s), 1e3 * (end_s - between_s), 1e3 * (end_s - start_s)
 
 
-def detector_speed(images, weights, runtimes=('torch', 'onnxruntime'), sizes=(640, 512)):
-    """Measure the time of detection on the CPU, from the image to the boxes.
-
-    All runtimes and sizes process each of the `images`, (height, width, 3) RGB, in turn, so that other load on the
-    machine affects all of them equally and their ratios remain valid. `weights` is a checkpoint (.pt), the only format
-    that every runtime supports; `sizes` are the longer side of the input in pixels.
-
-    Returns a list of {runtime, size, threads, cpu_ms (of all threads of this process), wall_ms}, medians over the
-    images. Raises ValueError if there are no images, or a runtime does not support these weights.
-    """
-    if not len(images):
-        raise ValueError('no images; at least one image is required to measure the speed of the detector')
-    from ros_3d_bb.detection.yolov5.backends import RuntimeParams, open_detector  # may import torch (slow)
-    cases = [(runtime, size) for runtime in runtimes for size in sizes]
-    detectors = [open_detector(weights, DetectionParams(image_size=size), RuntimeParams(runtime, 'cpu', threads=1))
-                 for runtime, size in cases]
-    times_ms = []
-    for image in [images[0]] * DETECTOR_WARM_UPS + list(images):
-        times_ms.append([_detector_time_ms(detector, image) for detector in detectors])
-    medians_ms = np.median(times_ms[DETECTOR_WARM_UPS:], axis=0).tolist()
-    return [{'runtime': runtime, 'size': size, 'threads': 1, 'cpu_ms': cpu_ms, 'wall_ms': wall_ms}
-            for (runtime, size), (cpu_ms, wall_ms) in zip(cases, medians_ms)]
-
-
-def _detector_time_ms(detector, image):
-    cpu_s, wall_s = time.process_time(), time.perf_counter()
-    detector.detect(image)
-    return (time.process_time() - cpu_s) * 1e3, (time.perf_counter() - wall_s) * 1e3
-
-
 def run(arguments):
-    """Measure the times, and those of the detector if there are weights."""
     with tempfile.TemporaryDirectory() as folder:
         session = read_session(arguments.data or write_simulated_session(folder, *SIMULATED))
         result = speed(session, OBJECTS, arguments.images, arguments.published)
-        colors = [read_color(frame, session.camera) for frame in session.frames[:DETECTOR_IMAGES]]
     result['data'] = arguments.data or 'simulated'
-    result['detector'] = detector_speed(colors, arguments.weights) if arguments.weights else []
     print(line_of(**{key: result[key] for key in ('machine', 'people', 'data', 'images')}))
     rows = {'%s/%s' % (name, key): values for name in ('ours', 'thesis', 'published') if name in result
             for key, values in result[name].items()}
     rows.update({name: values for name, values in result.items() if name.startswith('ratio')})
     print('\n'.join(table_of({name: dict(zip(result['objects'], values)) for name, values in rows.items()})))
-    for row in result['detector']:
-        print(line_of(**row))
     return result
 
 
 def add_options(parser):
     parser.add_argument('--data', default=data_folder('thesis'), metavar='DIR',
                         help='measurement session (default: $ROS_3D_BB_DATA/data/thesis, or simulated)')
-    parser.add_argument('--weights', default=default_weights(), metavar='FILE',
-                        help='YOLOv5 checkpoint; also measures the detector')
     parser.add_argument('--published', metavar='DIR',
                         help='checkout of github.com/Jyrijoul/ros_3d_bb, the published code; also measures it')
     parser.add_argument('--images', type=in_range(int, 1), default=60,

@@ -7,7 +7,6 @@ def text_of(value):
 
 
 def line_of(*values, **named):
-    """One line with values and named values."""
     return '  '.join([text_of(value) for value in values] + ['%s %s' % (name, text_of(named[name])) for name in named])
 
 
@@ -19,11 +18,9 @@ def table_of(rows):
 
 
 def lines_of(header, rows):
-    """Lines of a table of text, with columns that are aligned to the right."""
     widths = [max(map(len, column)) for column in zip(header, *rows)]
     return ['  '.join(text.rjust(width) for text, width in zip(row, widths)) for row in [header] + rows]
 
 
 def transposed(rows):
-    """{column: {name: value}} of {name: {column: value}}."""
     return {key: {name: row[key] for name, row in rows.items()} for key in next(iter(rows.values()))}

@@ -35,7 +35,6 @@ class Rectangle(NamedTuple):
         return True
 
     def is_within(self, bounds):
-        """Whether the rectangle lies inside the bounds (x0, x1, y0, y1) of a room."""
         (x_min, y_min), (x_max, y_max) = self.corners().min(axis=0), self.corners().max(axis=0)
         return bool(bounds[0] < x_min and x_max < bounds[1] and bounds[2] < y_min and y_max < bounds[3])
 

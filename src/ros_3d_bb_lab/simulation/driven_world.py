@@ -132,7 +132,6 @@ class DrivenWorld(object):
         return Rectangle(tuple(pose[:2]), pose[2], self._robot.drive.footprint)
 
     def _static_contacts(self, footprint):
-        """Names of the furniture and walls that a footprint touches."""
         names = ['furniture %d' % number for number, rectangle in enumerate(self._furniture, 1)
                  if footprint.overlaps(rectangle)]
         return names if footprint.is_within(self._room.bounds) else names + [WALL]

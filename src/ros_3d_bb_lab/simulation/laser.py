@@ -43,7 +43,6 @@ def _to_segments(origin, beams, corners):
 
 
 def rectangles_of(room):
-    """The room and its furniture as a list of Rectangle."""
     x0, x1, y0, y1 = room.bounds
     walls = Rectangle(((x0 + x1) / 2, (y0 + y1) / 2), 0.0, (x1 - x0, y1 - y0))
     return [walls] + [Rectangle(item.at, item.yaw, item.size[:2]) for item in room.furniture]

@@ -10,8 +10,6 @@ CELL_M = 0.5  # maximum edge of a face of a box; faces that are partly behind th
 
 
 class Mesh(NamedTuple):
-    """Surface of quadrilaterals."""
-
     vertices: np.ndarray  # (n, 3)
     normals: np.ndarray   # (n, 3), unit vectors
     faces: np.ndarray     # (m, 4), indices of vertices
@@ -56,7 +54,6 @@ def loft(centers, half_axes, exponent, sides, axes=(0, 1)):
 
 
 def merged(parts):
-    """Vertices and faces of several surfaces [(vertices, faces), ...] as one."""
     offsets = np.cumsum([0] + [len(vertices) for vertices, _faces in parts[:-1]])
     return (np.concatenate([vertices for vertices, _faces in parts]),
             np.concatenate([faces + offset for (_vertices, faces), offset in zip(parts, offsets)]))

@@ -49,7 +49,6 @@ class Motion(object):
                      Posture(float(mean[PHASE]), float(mean[SWING]), float(mean[CROUCH])))
 
     def _evaluated(self, time_s):
-        """Values at a time, and their integrals up to this time."""
         knot = int(np.clip(np.searchsorted(self._times_s, time_s, side='right') - 1, 0, len(self._times_s) - 1))
         beyond_s = time_s - self._times_s[knot]
         outside = knot == len(self._times_s) - 1 or beyond_s < 0
@@ -59,7 +58,6 @@ class Motion(object):
 
 
 def person_motion(person, height_m, duration_s):
-    """Motion of a person (`scenario.Person`) of the height `height_m`."""
     return _Knots(person.start, person.facing, person.crouch, height_m).motion(person, duration_s)
 
 
@@ -140,7 +138,6 @@ class _Knots(object):
 
 
 def wrapped(angle):
-    """Angle plus a multiple of 2 pi, from -pi to pi."""
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 

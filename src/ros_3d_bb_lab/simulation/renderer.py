@@ -19,8 +19,6 @@ SHADOW_DARKNESS, SHADOW_REDUCTION = .38, 4
 
 
 class Rendering(NamedTuple):
-    """Rendered images."""
-
     color: np.ndarray          # (h, w, 3), uint8, RGB
     inverse_depth: np.ndarray  # (h, w), float32
     objects: np.ndarray        # (h, w), uint8: 1 + the index of the object; 0 is the room
@@ -42,7 +40,6 @@ def render(room, meshes, shadows, camera, world_from_camera):
 
 
 def _render_object(rendering, mesh, camera, world_from_camera):
-    """Add one object to a rendering."""
     rotation, position = (part.astype(np.float32) for part in (world_from_camera[:3, :3], world_from_camera[:3, 3]))
     points = (mesh.vertices - position).dot(rotation)
     inverse = 1 / np.maximum(points[:, 2], np.float32(MIN_DEPTH_M))
@@ -93,7 +90,6 @@ def _cross(a, b):
 
 
 def _brightness(mesh, world_from_camera):
-    """Brightness of each vertex, lit from above and from the camera."""
     lit = AMBIENT + DIFFUSE * np.maximum(mesh.normals.dot(LIGHT), -.4)
     return (lit + HEADLIGHT * np.maximum(-mesh.normals.dot(world_from_camera[:3, 2].astype(np.float32)), 0)) * mesh.tone
 

@@ -18,8 +18,6 @@ Point = Tuple[float, float]
 
 
 class Furniture(NamedTuple):
-    """Box on the floor."""
-
     at: Point
     size: Tuple[float, float, float]
     yaw: float = 0.0
@@ -91,7 +89,6 @@ class Robot(NamedTuple):
 
     @property
     def mounts(self):
-        """All cameras. The name of an only camera is empty."""
         return self.cameras or (Mount('', self.mount, 0.0, self.pitch),)
 
 

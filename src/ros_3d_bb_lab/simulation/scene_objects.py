@@ -59,7 +59,6 @@ class PushedMotion(object):
         self._person, self._distance_m = person, distance_m
 
     def at(self, time_s):
-        """State at a time since the start."""
         before, now, after = (self._place(time_s + shift_s) for shift_s in (-STEP_S, 0, STEP_S))
         state = self._person.at(time_s)
         return State(now, (after - before) / (2 * STEP_S), state.heading_rad, state.posture)

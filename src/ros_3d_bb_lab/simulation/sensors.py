@@ -120,14 +120,12 @@ def _depth_table(params):
 
 
 def _noise_field(shape, params, random):
-    """Noise of disparity in steps, float32."""
     noise_px = _correlated(shape, params.noise_kernel_px, random) * params.noise_px
     noise_px += random.standard_normal(shape) * params.white_noise_px
     return noise_px.astype(np.float32) * np.float32(params.steps_per_px)
 
 
 def _hole_field(shape, params, random):
-    """255 in holes, else 0, uint8."""
     field = _correlated(shape, params.hole_kernel_px, random)
     return (field > np.percentile(field, 100 * (1 - params.hole_share))).astype(np.uint8) * 255
 

@@ -55,7 +55,6 @@ class Poses(NamedTuple):
 
     @property
     def map_from_camera(self):
-        """Pose of the camera in the map."""
         return self.map_from_odom.dot(self.odom_from_base).dot(self.base_from_camera)
 
 
@@ -69,8 +68,6 @@ class WorldState(NamedTuple):
 
 
 class SimulatedFrame(NamedTuple):
-    """One image of one camera."""
-
     number: int
     time_s: float         # since the start
     color: np.ndarray     # (h, w, 3), uint8 RGB
@@ -82,7 +79,6 @@ class SimulatedFrame(NamedTuple):
 
     @property
     def truth(self):
-        """Ground truth of people and other objects."""
         return self.people + list(self.objects)
 
 
@@ -115,7 +111,6 @@ class Simulator(object):
         self._stereo = StereoCamera(camera, scenario.seed) if scenario.depth_noise else None
 
     def time_s(self, number):
-        """Time of a frame since the start."""
         return number / self.rate
 
     def steps(self):
@@ -147,7 +142,6 @@ class Simulator(object):
         return SimulatedFrame(number, time_s, color, depth_mm, poses, people, self.camera_names[turn], objects)
 
     def state_at(self, time_s):
-        """Return the WorldState at a time if the robot and the people follow their moves."""
         x, y, yaw = np.array(self.scenario.robot.odometry_drift) * time_s
         return WorldState(time_s, self._robot.at(time_s), [motion.at(time_s) for motion in self.motions],
                           upright(x, y, 0, yaw))

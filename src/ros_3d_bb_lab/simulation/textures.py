@@ -18,7 +18,6 @@ def mottle(size_px, random, octaves=6):
 
 
 def floor(width_m, depth_m, random):
-    """Stone tiles."""
     image = _mottled((155, 153, 146), width_m, depth_m, FLOOR_PPM, 6, random)
     tile = int(FLOOR_TILE_M * FLOOR_PPM)
     image[::tile] *= .85
@@ -27,7 +26,6 @@ def floor(width_m, depth_m, random):
 
 
 def ceiling(width_m, depth_m):
-    """Panels with lamps."""
     image = np.full((int(depth_m * CEILING_PPM), int(width_m * CEILING_PPM), 3), (205, 203, 200), np.uint8)
     tile = int(CEILING_TILE_M * CEILING_PPM)
     image[::tile], image[:, ::tile] = 170, 170

@@ -224,7 +224,6 @@ def _extended(box, height_m, depth_m, camera, floor):
 
 
 def _hides_legs(other, person):
-    """Whether a nearer person is in front of most of the lower edge of a person's box."""
     return other.box[1] < person.box[3] < other.box[3] and _hidden_share(person, other) > HIDDEN_SHARE
 
 

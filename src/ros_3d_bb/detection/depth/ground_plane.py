@@ -160,17 +160,8 @@ def fit_floor(depth, camera, params=DepthPeopleParams()):
     Points below a plane count against it, so that tables and shelves are not detected as the floor. The same image
     always gives the same floor.
 
-    Parameters
-    ----------
-    depth : ros_3d_bb.camera.images.DepthImage
-    camera : ros_3d_bb.camera.camera_model.Camera
-    params : DepthPeopleParams
-        Limits of the height and tilt of the camera.
-
-    Returns
-    -------
-    Floor or None
-        None if no credible floor is visible.
+    `params` are DepthPeopleParams with the limits of the height and tilt of the camera. Returns None if no credible
+    floor is visible.
     """
     return _fit(*_points(depth, camera), params)
 

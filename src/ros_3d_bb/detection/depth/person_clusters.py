@@ -99,7 +99,6 @@ class Shape(NamedTuple):
 
 
 def grid_of(depth, camera, floor, params):
-    """Sample a depth image on the grid. Returns Grid."""
     step = max(1, int(round(CELL_RAD * camera.fx)))
     values = depth.part(slice(step // 2, None, step), slice(step // 2, None, step))
     depth_m = values.astype(np.float32) * np.float32(depth.scale_m)
@@ -119,7 +118,6 @@ def _ends(valid):
 
 @functools.lru_cache(maxsize=8)  # undistortion takes longer than the rest
 def _camera_rays(camera, step):
-    """Viewing rays of the cells of a grid, as `Camera.rays`."""
     return camera.rays(np.arange(step // 2, camera.width, step), np.arange(step // 2, camera.height, step)[:, None])
 
 
@@ -218,7 +216,6 @@ def is_human(shape):
 
 
 def is_standing(shape, params):
-    """Whether a blob has the size of a standing person."""
     is_high = shape.top_m >= params.min_top and (shape.cut_bottom or shape.top_m - shape.bottom_m >= MIN_VISIBLE_M)
     return is_human(shape) and (shape.cut_top or is_high)
 

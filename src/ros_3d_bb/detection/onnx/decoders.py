@@ -46,36 +46,6 @@ def decode_final(outputs, _input_hw, _classes, confidence, _strides=()):
     return Detections(rows[:, :4], rows[:, 4], rows[:, 5].astype(int))
 
 
-def decode_relative(outputs, input_hw, _classes, confidence, _strides=()):
-    """RT-DETR of ultralytics: rows of x, y, width, height, relative to the input, score, class number; (1, n, 6)."""
-    rows = outputs[0][0]
-    rows = rows[rows[:, 4] > confidence]
-    height, width = input_hw
-    return Detections(_corners(rows[:, :4] * (width, height, width, height)), rows[:, 4], rows[:, 5].astype(int))
-
-
-def decode_distances(outputs, input_hw, classes, confidence, strides, offset=0.5):
-    """NanoDet and PicoDet: class scores, and a distribution of the distance from the cell to each edge of the box.
-
-    The outputs are rows of both, (1, n, classes + 4 * bins), or rows of the scores of each stride followed by rows of
-    the distributions of each stride. Distances are in strides, from the point `offset` cells right of and below the
-    upper left corner of the cell. Scores may be before or after the sigmoid.
-    """
-    rows = outputs[0][0]
-    if len(outputs) > 1:
-        rows = np.hstack([np.concatenate([_rows_of(output) for output in part])
-                          for part in (outputs[:len(strides)], outputs[len(strides):])])
-    scores = rows[:, :classes]
-    if not is_probability(scores):
-        scores = sigmoid(scores)
-    above, best, scores = _best(scores, confidence)
-    cells = grid(input_hw, strides)[above]
-    distances = _expected_bins(rows[above, classes:])
-    points = cells[:, :2] + offset
-    corners = np.hstack((points - distances[:, :2], points + distances[:, 2:])) * cells[:, 2:]
-    return Detections(corners, scores, best)
-
-
 @functools.lru_cache(maxsize=8)
 def grid(input_hw, strides):
     """Column, row and stride of the cells of an input (height, width), as an array (n, 3)."""
@@ -87,12 +57,10 @@ def grid(input_hw, strides):
 
 
 def cell_count(input_hw, strides):
-    """Number of the cells of `grid`."""
     return sum(-(-input_hw[0] // stride) * -(-input_hw[1] // stride) for stride in strides)
 
 
 def is_probability(scores):
-    """Whether scores are after the sigmoid."""
     return not scores.size or (scores.min() >= 0 and scores.max() <= 1)
 
 
@@ -107,21 +75,3 @@ def _corners(boxes):
     """Convert boxes (n, 4) from center, width and height to corners."""
     center, half = boxes[:, :2], boxes[:, 2:] / 2
     return np.hstack((center - half, center + half))
-
-
-def _rows_of(output):
-    """Convert a map (1, channels, height, width) to rows (n, channels); rows (1, n, channels) stay."""
-    return output[0].reshape(len(output[0]), -1).T if output.ndim == 4 else output[0]
-
-
-def sigmoid(values):
-    """Logistic function."""
-    with np.errstate(over='ignore'):  # for large negative values the result is 0
-        return 1 / (1 + np.exp(-values))
-
-
-def _expected_bins(distributions):
-    """Expected values (n, 4) of distributions (n, 4 * bins), whose softmax is the probability of each bin."""
-    bins = distributions.reshape(len(distributions), 4, distributions.shape[1] // 4)  # -1 is ambiguous without rows
-    weights = np.exp(bins - bins.max(axis=2, keepdims=True))
-    return (weights * np.arange(bins.shape[2], dtype=np.float32)).sum(axis=2) / weights.sum(axis=2)

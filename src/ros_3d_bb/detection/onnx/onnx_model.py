@@ -1,7 +1,7 @@
 """Detection networks in ONNX files, run by ONNX Runtime.
 
-The head is recognised by the outputs for a grey image (`heads`); a YAML file beside the ONNX file can give it, and the
-preprocessing (`model_settings`).
+The head is recognised by the outputs for a grey image (`heads`); a YAML file beside the ONNX file can give the names of
+the classes.
 """
 import ast
 import functools
@@ -9,10 +9,9 @@ import functools
 import numpy as np
 
 from ros_3d_bb.core.error_text import cause
-from ros_3d_bb.detection.network_detector import BGR, MAX_INPUT_PX, RGB, Resize, batch_of
+from ros_3d_bb.detection.network_detector import BGR, GREY, MAX_INPUT_PX, RGB, batch_of
 from ros_3d_bb.detection.onnx.heads import HEADS, layout_of
-from ros_3d_bb.detection.onnx.model_settings import MAX_STRIDE, ModelSettings, read_settings
-from ros_3d_bb.detection.weights import MAX_CLASSES, WeightsError, class_names
+from ros_3d_bb.detection.weights import MAX_CLASSES, WeightsError, class_names, names_beside
 
 INSTALL = ('ONNX Runtime is not installed; install it with "pip3 install onnxruntime" ("onnxruntime<1.11" on Ubuntu '
            '18.04 and 20.04, see doc/installing.md)')
@@ -21,28 +20,28 @@ TWO_FILES = ('its weights are in a second file; onnx.save(onnx.load("IN.onnx"), 
 LOCATION = b'\x0a\x08location'  # key of the name of that file, with its field number and length
 CPU, CUDA = 'CPUExecutionProvider', 'CUDAExecutionProvider'
 DTYPES = {'tensor(float)': np.float32, 'tensor(float16)': np.float16, 'tensor(uint8)': np.uint8}
+MAX_STRIDE = 1024
 MAX_OUTPUT_BYTES = 2 ** 28
 MAX_SCORE = 1.005  # with the rounding of float16 and of quantized networks
 MAX_METADATA = 10 ** 6  # characters
 MAX_LISTED, MAX_LIST_LENGTH = 20, 2000  # inputs or outputs in a message, and characters
-GREY = 114  # of the image by which the head is recognised
 
 
 class OnnxModel(object):
     """Network of an ONNX file, for `network_detector.NetworkDetector`.
 
     Raises WeightsError if the file cannot be used: it is damaged, its outputs are those of no known head, or the YAML
-    file beside it is invalid.
+    file with its class names is invalid.
     """
 
     def __init__(self, path, threads, gpu=None):
         self.description = 'ONNX Runtime on ' + ('the CPU, threads: %d' % threads if gpu is None else 'cuda:%d' % gpu)
-        settings, self._session = read_settings(path), None
+        names, self._session = names_beside(path), None
         try:
             with open(path, 'rb') as stream:
                 content = stream.read()
             self._session = session_of(content, threads, gpu)
-            self._configure(settings, self._session.get_modelmeta().custom_metadata_map)
+            self._configure(names, self._session.get_modelmeta().custom_metadata_map)
         except ImportError:
             raise WeightsError('weights %s: %s, or use the .pt checkpoint' % (path, INSTALL))
         except OSError as error:
@@ -51,7 +50,7 @@ class OnnxModel(object):
             reason = TWO_FILES if self._session is None and LOCATION in content else cause(error)
             raise WeightsError('weights %s: %s%s' % (path, reason, _signature(self._session)))
 
-    def _configure(self, settings, metadata):
+    def _configure(self, names, metadata):
         """Read the input, recognise the head by the outputs for a grey image, and set the attributes."""
         entry, *others = self._session.get_inputs()
         if others:
@@ -61,29 +60,26 @@ class OnnxModel(object):
             raise ValueError('its input is a %s; one of %s expected' % (entry.type, ', '.join(DTYPES)))
         self._input, self._dtype = entry.name, DTYPES[entry.type]
         self._channels_last, self.input_hw = _input_layout(entry.shape)
-        self.stride = _stride(metadata, settings)
+        self.stride = _stride(metadata)
         probe_hw = self.input_hw or (3 * max(64, self.stride), 4 * max(64, self.stride))
         probe = np.full(probe_hw + (3,), GREY, np.uint8)
-        names = settings.names or _names(metadata)
-        self._prepare = _preprocessing(self._dtype, HEADS['yolov5'], ModelSettings())
+        names = names or _names(metadata)
+        self._prepare = _preprocessing(self._dtype, HEADS['yolov5'])
         outputs = self._run(probe)
-        self._layout = layout_of(outputs, probe_hw, metadata, settings.head, settings.strides, names)
-
+        self._layout = layout_of(outputs, probe_hw, metadata, names)
         self.stride = max((self.stride,) + self._layout.strides)
         self._head = HEADS[self._layout.head]
         self.description += ', head: %s' % self._layout.head
         self.names = class_names(names or None, self._layout.classes)
-        self.suppressed = self._head.suppressed
-        self.resize = Resize(settings.resize or self._head.resize,
-                             self._head.padding if settings.padding < 0 else settings.padding)
-        self._prepare = _preprocessing(self._dtype, self._head, settings)
+        self.suppressed, self.padding = self._head.suppressed, self._head.padding
+        self._prepare = _preprocessing(self._dtype, self._head)
         self.candidates(probe, 0.0)
 
     def candidates(self, image, confidence):
         """Detections in an image with a score above the confidence, see `network_detector.NetworkDetector`."""
         outputs = self._run(image)
-        outputs = [outputs[index].astype(np.float32, copy=False) for index in self._layout.order]
-        found = self._head.decode(outputs, image.shape[:2], self._layout.classes, confidence, self._layout.strides)
+        found = self._head.decode([outputs[0].astype(np.float32, copy=False)], image.shape[:2], self._layout.classes,
+                                  confidence, self._layout.strides)
         best = found.scores.max() if len(found.scores) else 0.0
         if best > MAX_SCORE:
             raise ValueError('its scores are up to %.3g; 0 to 1 expected: its outputs are not those of the head %s'
@@ -106,17 +102,9 @@ class OnnxModel(object):
         return outputs
 
 
-def _preprocessing(dtype, head, settings):
-    """Function that converts an RGB image to a batch (1, 3, height, width) for networks with this head."""
-    color = settings.color or head.color
-    order = BGR if color == 'bgr' else RGB
-    if dtype == np.uint8:
-        if settings.mean or settings.std:
-            raise ValueError('its input is uint8, to which mean and std of the YAML file do not apply')
-        return functools.partial(batch_of, order=order, std=(1.0, 1.0, 1.0), dtype=dtype)
-    step = 1 if color == head.color else -1
-    return functools.partial(batch_of, order=order, mean=tuple(settings.mean or head.mean[::step]),
-                             std=tuple(settings.std or head.std[::step]), dtype=dtype)
+def _preprocessing(dtype, head):
+    return functools.partial(batch_of, order=BGR if head.color == 'bgr' else RGB, dtype=dtype,
+                             scale=1.0 if dtype == np.uint8 else head.scale)
 
 
 def _input_layout(shape):
@@ -135,9 +123,9 @@ def _input_layout(shape):
     return channels_last, size
 
 
-def _stride(metadata, settings):
+def _stride(metadata):
     """Number of pixels of which height and width are multiples."""
-    stride = str(metadata.get('stride', max(settings.strides or (32,))))
+    stride = str(metadata.get('stride', 32))
     if not (stride.isdigit() and 1 <= int(stride) <= MAX_STRIDE):
         raise ValueError('its stride is %.40r; 1 to %d expected' % (stride, MAX_STRIDE))
     return int(stride)

@@ -45,19 +45,7 @@ class RuntimeParams(NamedTuple):
 def open_detector(weights, detection=DetectionParams(), running=RuntimeParams(), warn=warnings.warn):
     """Open a network as the nodes do, and return it as a `network_detector.NetworkDetector`.
 
-    Parameters
-    ----------
-    weights : str
-        Path of the checkpoint or exported network.
-    detection : network_detector.DetectionParams
-    running : RuntimeParams
-    warn : callable
-        Called with the text of each warning.
-
-    Raises
-    ------
-    ValueError
-        If the network cannot be used.
+    `warn` is called with the text of each warning. Raises ValueError if the network cannot be used.
     """
     detector = NetworkDetector(open_runtime(os.path.abspath(os.path.expanduser(weights)), running, warn), detection)
     detector.detect(np.zeros((480, 640, 3), np.uint8))  # the first detection takes several times as long as others
@@ -65,10 +53,9 @@ def open_detector(weights, detection=DetectionParams(), running=RuntimeParams(),
 
 
 def open_runtime(path, params=RuntimeParams(), warn=warnings.warn):
-    """Load an official YOLOv5 checkpoint (.pt), its export to TorchScript (.torchscript), or any known detector in
-    an ONNX file (.onnx).
+    """Load an official YOLOv5 checkpoint (.pt), or any known detector in an ONNX file (.onnx).
 
-    A TorchScript file is a program: load only trusted files. `warn` is called with one line of text for problems that
+    `warn` is called with one line of text for problems that
     are worked around. Raises WeightsError if the file cannot be used, or needs torch and torch is not installed, and
     ValueError if a parameter is out of range, the device does not exist, or the runtime cannot run this file.
     """
@@ -95,12 +82,6 @@ def _open_file(path, params, threads, warn):
             raise ValueError('runtime torch cannot run %s; use auto or onnxruntime, or the .pt checkpoint' % path)
         is_small = os.path.isfile(path) and os.path.getsize(path) <= SMALL_BYTES
         return OnnxModel(path, 1 if is_small and not params.threads else threads, gpu_for_onnx(params.device, path))
-
-    if path.endswith(('.torchscript', '.torchscript.pt')):
-        if params.runtime == 'onnxruntime':
-            raise ValueError('runtime onnxruntime cannot run %s; use auto or torch, or the .pt checkpoint' % path)
-        from ros_3d_bb.detection.yolov5.torch_backend import TorchScriptRuntime, torch_device
-        return TorchScriptRuntime(path, torch_device(params.device), threads)
 
     if params.runtime == 'onnxruntime' or params.runtime == 'auto' and not on_gpu(params.device):
         try:

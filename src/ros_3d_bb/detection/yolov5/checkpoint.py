@@ -44,7 +44,6 @@ def read_checkpoint(path):
 
 
 def unreadable(path, error):
-    """WeightsError for an OSError."""
     return WeightsError('weights %s: cannot be read (%s); %s' % (path, error.strerror, EXPECTED))
 
 
@@ -70,8 +69,6 @@ class _Unpickler(pickle.Unpickler):
             raise pickle.UnpicklingError('the archive contains no data.pkl')
         self._folder = pickles[0].split('/')[0]
         self._storages, self._classes = {}, {}
-        if self._folder + '/constants.pkl' in archive.namelist():
-            raise pickle.UnpicklingError('the file is a TorchScript export; its name must end in .torchscript')
         compressed = [info.filename for info in archive.infolist() if info.compress_type != zipfile.ZIP_STORED]
         if compressed:  # torch never compresses; decompression could exhaust the memory
             raise pickle.UnpicklingError('%s is compressed' % compressed[0])

@@ -19,7 +19,6 @@ class NetworkPeople(Detector):
         super(NetworkPeople, self).reconfigure(params, detection, running)
 
     def sizes(self, camera):
-        """Return the sizes with which people are detected up to ~detection_range; ~image_size if it is given."""
         detection, _running = self._own
         if detection.image_size or self._network.has_fixed_size:
             return (self._network.input_px,)

@@ -1,8 +1,8 @@
 """Cache of YOLOv5 checkpoints that are exported to ONNX, for ONNX Runtime on the CPU. See `backends`.
 
-A cached file is named by the SHA-256 of its checkpoint and by `VERSION`, and accepts images of any size. It ends with
-its own SHA-256, and contains the output of torch for a reference image, which ONNX Runtime must reproduce each time the
-file is loaded. Loading a cached file executes no code from it; torch is needed only to create it.
+A cached file is named by the SHA-256 of its checkpoint and by `VERSION`, and accepts images of any size. It
+contains the output of torch for a reference image, which ONNX Runtime must reproduce each time the file is loaded.
+Loading a cached file executes no code from it; torch is needed only to create it.
 """
 import base64
 import hashlib
@@ -15,10 +15,9 @@ from ros_3d_bb.core.atomic_file import atomic_write
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.detection.onnx.onnx_model import INSTALL, session_of
 from ros_3d_bb.detection.yolov5.checkpoint import unreadable
-from ros_3d_bb.detection.yolov5.onnx_writer import metadata_entry
 from ros_3d_bb.detection.yolov5.predictions import Backend, decode_heads, reference_image
 
-VERSION = 1  # of the cached files; increase it when network.py or onnx_export.py change their content
+VERSION = 2  # of the cached files; increase it when network.py or onnx_export.py change their content
 # Maximum difference between ONNX Runtime and torch. Measured with yolov5n: 3e-4 px, 1e-6.
 MAX_DIFFERENCE_PX, MAX_DIFFERENCE = 0.05, 1e-3
 
@@ -85,7 +84,7 @@ def open_exported(path, folder, threads, warn):
     runtime = ExportedRuntime(model, threads)
     try:
         os.makedirs(folder, mode=0o700, exist_ok=True)
-        atomic_write(file_path, with_checksum(model))
+        atomic_write(file_path, model)
     except OSError as error:
         warn('the ONNX export cannot be saved (%s); the checkpoint will be exported again at the next start'
              % cause(error))
@@ -99,18 +98,10 @@ def export_folder(folder=''):
     return os.path.abspath(os.path.expanduser(folder or os.path.join(cache, 'onnx')))
 
 
-def with_checksum(model):
-    """Append the SHA-256 of a model to its metadata. The result is still a valid ONNX file."""
-    return model + metadata_entry('sha256', hashlib.sha256(model).hexdigest())
-
-
 def _open_cached(path, digest, threads):
     with open(path, 'rb') as stream:
         content = stream.read()
-    model = content[:-len(with_checksum(b''))]
-    if with_checksum(model) != content:
-        raise ValueError('its checksum is wrong')
-    runtime = ExportedRuntime(model, threads)
+    runtime = ExportedRuntime(content, threads)
     if runtime.checkpoint != digest:
         raise ValueError('it was exported from another checkpoint')
     return runtime

@@ -46,16 +46,10 @@ class Graph(object):
         graph = _fields((1, self._nodes), (2, 'network'), (5, self._constants),
                         (11, [_value(*entry) for entry in inputs]), (12, [_value(*entry) for entry in outputs]))
         return (_fields((1, IR_VERSION), (2, 'ros_3d_bb'), (7, graph), (8, _fields((2, OPSET))))
-                + b''.join(metadata_entry(key, metadata[key]) for key in sorted(metadata)))
-
-
-def metadata_entry(key, value):
-    """One entry of the metadata of a model, as bytes. It may be appended to a serialized model."""
-    return _fields((14, _fields((1, key), (2, value))))
+                + b''.join(_fields((14, _fields((1, key), (2, metadata[key])))) for key in sorted(metadata)))
 
 
 def _value(name, element, shape):
-    """ValueInfoProto of a tensor."""
     dimensions = [_fields((2, size)) if isinstance(size, str) else _fields((1, size)) for size in shape]
     return _fields((1, name), (2, _fields((1, _fields((1, element), (2, _fields((1, dimensions))))))))
 

@@ -5,8 +5,7 @@ network, one per scale, contain the same predictions before decoding.
 """
 import numpy as np
 
-from ros_3d_bb.detection.network_detector import Resize
-from ros_3d_bb.detection.onnx.decoders import decode_rows, sigmoid
+from ros_3d_bb.detection.onnx.decoders import decode_rows
 
 
 class Backend(object):
@@ -14,7 +13,7 @@ class Backend(object):
     return the predictions above it, float32.
     """
 
-    input_hw, resize, suppressed = None, Resize(), False
+    input_hw, padding, suppressed = None, 'center', False
 
     def candidates(self, image, confidence):
         """Detections in an image with a score above the confidence, see `network_detector.NetworkDetector`."""
@@ -33,13 +32,6 @@ def reference_image(stride):
     return np.random.RandomState(0).randint(0, 256, (2 * stride, 3 * stride, 3)).astype(np.uint8)
 
 
-def predictions(output):
-    """Predictions (rows, 5 + classes) of the only image in an output (1, rows, 5 + classes), else ValueError."""
-    if len(output.shape) != 3 or output.shape[0] != 1 or output.shape[2] < 6:
-        raise ValueError('its output has shape %s; (1, rows, 5 + classes) expected' % (tuple(output.shape),))
-    return output[0]
-
-
 def decode_heads(heads, anchors_px, strides, min_objectness):
     """Predictions of the heads of a network, without those whose objectness is not above `min_objectness`.
 
@@ -49,13 +41,14 @@ def decode_heads(heads, anchors_px, strides, min_objectness):
     """
     with np.errstate(divide='ignore'):
         min_logit = np.log(np.clip(min_objectness, 0, 1) / np.float64(1 - np.clip(min_objectness, 0, 1)))
-    return np.concatenate([_decode_head(*scale, min_logit) for scale in zip(heads, anchors_px, strides)])
+    with np.errstate(over='ignore'):  # of the sigmoid, which is 0 for large negative values
+        return np.concatenate([_decode_head(*scale, min_logit) for scale in zip(heads, anchors_px, strides)])
 
 
 def _decode_head(head, anchors_px, stride, min_logit):
     values = head.reshape((len(anchors_px), -1) + head.shape[2:])
     anchor, line, column = np.nonzero(values[:, 4] > min_logit)
-    rows = sigmoid(values[anchor, :, line, column].astype(np.float32))
+    rows = 1 / (1 + np.exp(-values[anchor, :, line, column].astype(np.float32)))
     rows[:, :2] = (rows[:, :2] * 2 - 0.5 + np.stack((column, line), axis=1)) * stride
     rows[:, 2:4] = (rows[:, 2:4] * 2) ** 2 * anchors_px[anchor]
     return rows

@@ -1,15 +1,13 @@
-"""Torch backends: checkpoints in the network of this package, and TorchScript exports. See `backends`."""
-import json
-
+"""Torch backends: checkpoints in the network of this package. See `backends`."""
 import numpy as np
 import torch
 
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.detection.network_detector import batch_of
-from ros_3d_bb.detection.weights import WeightsError, class_names
+from ros_3d_bb.detection.weights import WeightsError
 from ros_3d_bb.detection.yolov5.checkpoint import EXPECTED, read_checkpoint
 from ros_3d_bb.detection.yolov5.network import Network
-from ros_3d_bb.detection.yolov5.predictions import Backend, check_stride, decode_heads, predictions
+from ros_3d_bb.detection.yolov5.predictions import Backend, check_stride, decode_heads
 
 
 def torch_device(name):
@@ -63,31 +61,6 @@ class TorchRuntime(Backend):
 
     def __call__(self, image, min_objectness):
         return run(self._network, image, min_objectness)
-
-
-class TorchScriptRuntime(Backend):
-    """Model exported to TorchScript by YOLOv5's export.py. It accepts only the image size of the export."""
-
-    def __init__(self, path, device, threads):
-        extra = {'config.txt': ''}
-        self.description = description_of(device, threads)
-        try:
-            self._module = torch.jit.load(path, map_location=device, _extra_files=extra).eval()
-            config = json.loads(extra['config.txt'] or '{}')
-            self.input_hw = tuple(config.get('shape', (1, 3, 640, 640))[2:])
-            self.stride = check_stride(config.get('stride', 32))
-            self._device = device
-            columns = self(np.zeros(self.input_hw + (3,), np.uint8), 0).shape[1]
-        except Exception as error:  # a damaged file can raise any exception
-            raise WeightsError('weights %s: not a YOLOv5 TorchScript export (%s); expected the file that its export.py '
-                               'writes (release 5.0: with --grid; without --half)' % (path, cause(error)))
-        self.names = class_names(config.get('names'), columns - 5)
-
-    def __call__(self, image, min_objectness):
-        with torch.no_grad():
-            output = self._module(torch.from_numpy(batch_of(image)).to(self._device))
-        rows = predictions(output[0] if isinstance(output, (tuple, list)) else output)
-        return rows[rows[:, 4] > min_objectness].cpu().numpy()
 
 
 def description_of(device, threads):

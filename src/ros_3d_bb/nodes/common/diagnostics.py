@@ -5,7 +5,6 @@ import time
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rospy.topics import get_topic_manager
 from std_msgs.msg import Header
 
 from ros_3d_bb.core.event_counter import EventCounter
@@ -18,9 +17,7 @@ from ros_3d_bb.nodes.common.subscribers import InputMonitor
 PERIOD_S = 1.0
 WARNING_LASTS_S = 5.0
 REMINDER_S = 30.0  # between two log lines about a persistent fault
-UNSUBSCRIBED_S = 5.0  # without subscribers, which may still be starting
 MOST_LAGS = 10000  # maximum number of stored latencies
-NO_RESULTS = '/rosout', '/diagnostics', '/clock', '/tf', '/tf_static'
 
 
 class Diagnostics(EventCounter):
@@ -42,8 +39,8 @@ class Diagnostics(EventCounter):
         self._lags_ns = collections.deque(maxlen=MOST_LAGS)  # latencies of the newest results
         self._warning, self._warned_at = '', float('-inf')
         self._logged_at, self._current_events = {}, set()
-        self._reported_s = self._subscribed_s = time.monotonic()
-        self._shown, self._checks, self._monitors = [], [], part.monitors
+        self._reported_s = time.monotonic()
+        self._shown, self._checks = [], []
         if part.monitors:
             inputs = InputMonitor()
             self._shown.append(inputs.values)
@@ -88,7 +85,6 @@ class Diagnostics(EventCounter):
         """Publish the status of the node."""
         is_recent = time.monotonic() - self._warned_at < WARNING_LASTS_S
         faults, totals = self._current_faults(), self.totals()
-        self._log_missing_subscribers()
         if is_recent:
             level, sentence = DiagnosticStatus.WARN, self._warning
         elif faults:
@@ -122,15 +118,6 @@ class Diagnostics(EventCounter):
         """Record the latency of a processed image, with or without a result, for the reported rate and latency."""
         self._lags_ns.append(rospy.get_rostime().to_nsec() - stamp.to_nsec())
 
-    def _log_missing_subscribers(self):
-        """Log once if the results have no subscribers, and again after subscribers left. This is not a fault."""
-        now_s, topics = time.monotonic(), unsubscribed_results() if self._monitors else []
-        if not topics:
-            self._subscribed_s = now_s
-        elif self._subscribed_s is not None and now_s - self._subscribed_s > UNSUBSCRIBED_S:
-            self._subscribed_s = None
-            rospy.loginfo('no subscribers on %s', ' or '.join(topics))
-
     def _rate_and_latency(self):
         """Yield (name, text) of the rate and latency of the results since the last report."""
         lags_ns, self._lags_ns = self._lags_ns, collections.deque(maxlen=MOST_LAGS)
@@ -150,10 +137,3 @@ class Diagnostics(EventCounter):
                     self._log('no report', 'the report on /diagnostics failed (%r); trying again' % error,
                               WARNING_LASTS_S)
             time.sleep(PERIOD_S)
-
-
-def unsubscribed_results():
-    """Return the result topics of this node if none of them has subscribers, otherwise an empty list."""
-    results = {topic: publisher for topic, publisher in sorted(get_topic_manager().pubs.items())
-               if topic not in NO_RESULTS and '/parameter_' not in topic}
-    return [] if any(publisher.has_connections() for publisher in results.values()) else list(results)

@@ -65,13 +65,11 @@ class GraphObserver(object):
         self._subscribe(self._depth_info, CameraInfo)
 
     def close(self):
-        """Unsubscribe from all topics."""
         self._listener.unregister()
         for subscriber in self._subscribers:
             subscriber.unregister()
 
     def observations(self):
-        """Return the Observations up to now."""
         self._topics.update(published_topics())
         boxes3d, frame_id = self._observed[BOXES3D].newest, self._bbox3d_param('frame_id')
         target_frame = self._target_frame or tracker_param('target_frame')
@@ -95,7 +93,6 @@ class GraphObserver(object):
         return _param(topic_of(self._camera_name, 'bbox3d_node'), name, Bbox3dParams)
 
     def _topic_of(self, name):
-        """Return the name of a topic of the nodes in this graph."""
         wanted = name_for(self._camera_name, name)
         resolved = rospy.resolve_name(wanted)
         if resolved != rospy.get_namespace() + wanted:
@@ -124,7 +121,6 @@ def name_for(camera_name, topic):
 
 
 def tracker_param(name):
-    """Return a parameter of the tracker, see `_param`."""
     return _param('tracker_node', name, TrackerNodeParams)
 
 

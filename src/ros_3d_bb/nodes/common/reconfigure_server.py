@@ -7,7 +7,6 @@ from dynamic_reconfigure.msg import Config, ConfigDescription, Group, ParamDescr
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
 
 from ros_3d_bb.core.params import params_from, table_of
-from ros_3d_bb.nodes.common.master import on_new_master
 from ros_3d_bb.nodes.common.startup import stored_params
 
 TYPES = {bool: 'bool', int: 'int', float: 'double', str: 'str', tuple: 'str'}  # the protocol has no lists
@@ -50,7 +49,6 @@ class ReconfigureServer(object):
         descriptions_pub.publish(description)
         self._updates_pub.publish(self._message())
         rospy.Service(namespace + 'set_parameters', Reconfigure, self._on_request)
-        on_new_master(lambda: self._store_changes({}))
 
     def _on_request(self, request):
         with self._lock:
@@ -74,12 +72,10 @@ class ReconfigureServer(object):
         self._params = params
 
     def _values(self):
-        """Return {name: value} in the types of the parameter server, with lists instead of tuples."""
         return {name: list(value) if isinstance(value, tuple) else value
                 for each in self._params for name, value in each._asdict().items()}
 
     def _store_changes(self, known):
-        """Set the live parameters that differ from `known` on the parameter server. Returns their names."""
         values = self._values()
         changed = [name for name in self._live if name not in known or known[name] != values[name]]
         for name in changed:
@@ -92,7 +88,6 @@ class ReconfigureServer(object):
 
 
 def live_in(kinds):
-    """Return the live parameters of NamedTuple types, {name: Param}."""
     return {name: param for name, param in table_of(kinds).items() if param.live}
 
 

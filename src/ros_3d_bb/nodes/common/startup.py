@@ -7,7 +7,7 @@ from typing import Any, Callable, NamedTuple, Optional
 import rospy
 
 from ros_3d_bb.core.params import params_from, with_places
-from ros_3d_bb.nodes.common.master import Registration
+from ros_3d_bb.nodes.common.master import cache_logging_parameter
 
 # Launch arguments for the parameter files of nodes.
 PARAMS_FILES = {'%s_node' % name: '%s_params' % name for name in (
@@ -29,8 +29,7 @@ class Part(NamedTuple):
     Parameters, services and diagnostics have the names of a node of its own, whose private namespace is `namespace`.
     `transforms` and `inputs`, an RgbdInputs, are shared; None: the node has its own. `next_stage` is called with each
     result after it is published, and what the next stage needs with it. `subscribes` states whether the node subscribes
-    to the results of the stage before, and `monitors` whether its diagnostics report on the inputs and subscribers of
-    the process.
+    to the results of the stage before, and `monitors` whether its diagnostics report on the inputs of the process.
     """
 
     namespace: str = '~'
@@ -79,7 +78,7 @@ def run_node(name, node_class, run=lambda _node: rospy.spin(), parts=()):
     """
     reuse_freed_memory()
     rospy.init_node(name)
-    Registration(parts)
+    cache_logging_parameter()
     try:
         node = node_class()
     except ValueError as error:

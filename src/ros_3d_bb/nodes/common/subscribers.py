@@ -100,7 +100,6 @@ def subscribe(topic, kind, callback, at_once=AT_ONCE, is_irregular=False):
 
 
 def subscribe_camera_info(topic, image_topic, callback, at_once=KEPT_AT_ONCE):
-    """Subscribe to the camera_info of the images on a topic, see `camera_msgs.info_of_images`."""
     image_topic = rospy.resolve_name(image_topic)
     return subscribe(topic, CameraInfo, lambda message: callback(info_of_images(message, image_topic)), at_once)
 
@@ -113,7 +112,6 @@ def _image_in(message):
 
 
 def inputs():
-    """Return the Input of each topic that is currently subscribed."""
     with _lock:
         _inputs[:] = [each for each in _inputs if each.subscriber.impl is not None]
         return list(_inputs)

@@ -33,7 +33,6 @@ class TransformListener(object):
             for topic, add in (('/tf', buffer.set_transform), ('/tf_static', buffer.set_transform_static))]
 
     def unregister(self):
-        """Unsubscribe from tf."""
         for subscriber in self._subscribers:
             subscriber.unregister()
 
@@ -118,11 +117,9 @@ class Transforms(TransformBuffer):
         return target_from_source, age_s
 
     def have_jumped(self):
-        """Whether time has jumped a moment ago, so that transforms of the new time are awaited."""
         return self._listener.has_jumped()
 
     def close(self):
-        """Unsubscribe from tf."""
         self._listener.unregister()
 
     def age(self):

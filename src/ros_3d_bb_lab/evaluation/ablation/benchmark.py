@@ -26,7 +26,7 @@ from ros_3d_bb_lab.evaluation.detectors import detector_of
 from ros_3d_bb_lab.evaluation.text_table import lines_of
 from ros_3d_bb_lab.evaluation.tracking.benchmark import outputs_of
 from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
-from ros_3d_bb_lab.evaluation.tracking.recorded_detections import read_recordings, with_sources
+from ros_3d_bb_lab.evaluation.tracking.recorded_detections import read_recordings
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING, STANDING
 from ros_3d_bb_lab.evaluation.tracking.run_generator import simulate
 from ros_3d_bb_lab.evaluation.tracking.trajectories import read_sequences
@@ -150,15 +150,13 @@ def views(_arguments):
 
 
 def pedestrians(_arguments):
-    """Scores of tracks of the recorded pedestrians, from a standing and a driving robot."""
     runs = [simulate(sequence, motion, (0, 0), seconds=PEDESTRIANS_S)
             for sequence in read_sequences(data_folder('trajectories')) for motion in (STANDING, DRIVING)]
     yield functools.partial(_track_scores, [run._replace(images=run.images[::PEDESTRIANS_EVERY]) for run in runs])
 
 
 def kitti(_arguments):
-    """Scores of tracks of the recorded detections."""
-    yield functools.partial(_track_scores, list(map(with_sources, read_recordings(data_folder('kitti'), 1, True))))
+    yield functools.partial(_track_scores, list(read_recordings(data_folder('kitti'))))
 
 
 def _track_scores(runs):
@@ -239,7 +237,6 @@ def run(arguments):
 
 
 def _table_of(benchmark, rows):
-    """Lines of the table of one benchmark."""
     base = rows['']
     texts = [['without ' + name] + ['=' if row[key] == base[key] else '%+.4g' % (row[key] - base[key]) for key in base]
              for name, row in rows.items() if name]

@@ -1,1 +1,1 @@
-"""Baselines for comparison: the thesis' algorithms, Norfair, and an oracle."""
+"""Baselines for comparison: the thesis' algorithms and Norfair."""

@@ -58,7 +58,6 @@ class OriginalTracker(object):
         self._tracks, self._last_id, self._now_ns, self._rate_hz = [], 0, None, USUAL_RATE_HZ
 
     def update(self, stamp_ns, detections, view=None):
-        """Update the tracks with the detections of one image, as `Tracker.update`."""
         return [self._published(track) for track in self.step(stamp_ns, detections)]
 
     def step(self, stamp_ns, detections):

@@ -95,13 +95,11 @@ class PublishedCode(object):
         self._predictor = modules['predictor'].Predictor(self._tracker, SENSITIVITY)
 
     def estimate(self, depth, rects_px):
-        """3D boxes (x, y, z and extents) in the frame of the camera."""
         self._node.depth_image = depth.values
         self._node.bounding_box_callback(types.SimpleNamespace(data=[edge for rect_px in rects_px for edge in rect_px]))
         return [box for box in self._node.bounding_boxes_3d.values() if box[2] != 0]
 
     def track(self, _stamp_ns, boxes):
-        """Update the tracks with one image. Returns the predicted positions by ID."""
         self._tracker.update([self._box(*transform_points(self._fixed_from_camera, np.array(box[:3])), *box[3:])
                               for box in boxes])
         self._predictor.update()

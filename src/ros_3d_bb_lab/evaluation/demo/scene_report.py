@@ -43,8 +43,6 @@ SEE_ALSO = 'The pages Bags and Troubleshooting of the documentation, and rosrun 
 
 
 class Recording(NamedTuple):
-    """Scene in a bag."""
-
     moments: list      # a Moment per image, without tracks if the tracker did not publish a message for the image
     has_truth: bool    # whether the bag contains ground truth
     answered: int      # number of images for which the tracker published a message
@@ -130,7 +128,6 @@ def write_csv(bag_path, csv_path):
 
 
 def topics_of_cameras(bag, topic):
-    """Names of a camera topic in an open bag: one name for each camera."""
     ending = topic_of('?', topic)[1:]
     names = map(absolute, bag.get_type_and_topic_info().topics)
     return [name for name in names if name.endswith(ending)]

@@ -58,7 +58,6 @@ def record_scene(scenario, folder):
 
 
 def _wait_for_robot(environment):
-    """Wait until the description of the robot is in the world, which is paused."""
     command = ['bash', '-c', 'until rostopic list -p 2> /dev/null | grep -q %s; do sleep 1; done' % DEPTH_TOPIC]
     subprocess.check_call(command, env=environment, timeout=TIMEOUT_S)
 
@@ -105,7 +104,6 @@ def result_of(moments):
 
 
 def run(arguments):
-    """Record each scenario, and run the pipeline on it."""
     detector = (['--detector', 'yolov5', '--weights', os.path.abspath(arguments.weights)] if arguments.weights
                 else ['--detector', 'depth'])
     print(describe_machine(), flush=True)

@@ -1,8 +1,6 @@
-"""Latency of the complete pipeline, from the image stamp to the markers, by detector and CPU load."""
-import contextlib
+"""Latency of the complete pipeline, from the image stamp to the markers, by detector."""
 import os
 import subprocess
-import sys
 import tempfile
 from typing import NamedTuple
 
@@ -13,19 +11,15 @@ from ros_3d_bb_lab.evaluation.launching import recorded
 from ros_3d_bb_lab.evaluation.text_table import line_of, table_of
 
 IMAGES = 60  # first images of the demo, played forwards and backwards: 2 s, 90 MB
-BUSY_LOOP = 'import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n    pass'
 # Nodes of the benchmark, which do not run on a robot.
 HARNESS = 'replay_node', 'latency_probe_node', 'rosout'
 
 
 class Case(NamedTuple):
-    """Case of the benchmark."""
-
     name: str
     detector: str    # of pipeline.launch
     image_size: int  # of the network; 0: the default, which adapts to the machine
     weights: str     # path of the model file
-    loaded: bool     # whether another process loads a core
 
 
 def cases_of(weights):
@@ -36,8 +30,7 @@ def cases_of(weights):
     detectors += [(name, name, 0, '') for name in without_weights()]
     detectors += [(name + '-640', 'yolov5', 640, path) for name, _detector, _size, path in detectors[:len(weights[:1])]]
     detectors += [('free', 'none', 0, '')]
-    return [Case(name + ('+load' if loaded else ''), detector, size, path, loaded)
-            for loaded in (False, True) for name, detector, size, path in detectors]
+    return [Case(*row) for row in detectors]
 
 
 def measured(case, arguments, bag, folder):
@@ -47,28 +40,13 @@ def measured(case, arguments, bag, folder):
     """
     options = {'bag': bag, 'detector': case.detector, 'weights': case.weights, 'image_size': case.image_size,
                'seconds': arguments.seconds, 'rate': arguments.rate, 'single_process': not arguments.separate}
-    with cpu_load(int(case.loaded)):
-        record = recorded('latency.launch', options, os.path.join(folder, case.name), arguments.seconds + 200)
-    result = dict(name=case.name, detector=case.name.split('+')[0], load='one core' if case.loaded else 'none')
-    result.update(result_of(record), load_average=record['load_average'])
+    record = recorded('latency.launch', options, os.path.join(folder, case.name), arguments.seconds + 200)
+    result = dict(result_of(record), name=case.name, load_average=record['load_average'])
     nodes = [node for node in result['cpu_percent'] if node not in HARNESS]
     return dict(result, pipeline={key: sum(result[key][node] for node in nodes) for key in ('cpu_percent', 'rss_mb')})
 
 
-@contextlib.contextmanager
-def cpu_load(cores):
-    """Context in which other processes load some cores. They end with this process in any case."""
-    processes = [subprocess.Popen([sys.executable, '-c', BUSY_LOOP]) for _core in range(cores)]
-    try:
-        yield
-    finally:
-        for process in processes:
-            process.kill()
-            process.wait()
-
-
 def print_result(result):
-    """Print a result: a line, a table of the nodes, and the latency by stage."""
     print(line_of(**{key: value for key, value in dict(result, **result['pipeline']).items()
                      if not isinstance(value, dict)}))
     print('\n'.join(table_of({node: {'cpu_percent': result['cpu_percent'][node], 'rss_mb': result['rss_mb'][node]}
@@ -77,7 +55,6 @@ def print_result(result):
 
 
 def run(arguments):
-    """Measure each case."""
     cases = _cases(arguments)
     print(describe_machine(), flush=True)
     results = []
@@ -106,14 +83,13 @@ def _cases(arguments):
 
 def add_options(parser):
     parser.add_argument('--cases', help='some of depth, free, the names of the model files without suffix and, for the '
-                        'first one, this name with -640, each with or without +load, separated by commas (default: '
-                        'all)')
+                        'first one, this name with -640, separated by commas (default: all)')
     parser.add_argument('--seconds', type=in_range(float, 1), default=20.0,
                         help='duration of a measurement (default: 20)')
     parser.add_argument('--rate', type=in_range(float, 0.1), default=30.0, metavar='HZ',
                         help='images per second (default: 30)')
     parser.add_argument('--weights', nargs='+', default=list(filter(None, [default_weights()])), metavar='FILE',
                         help='model files: YOLOv5 checkpoints, ONNX files (default: yolov5n.pt in the cache, if any)')
-    parser.add_argument('--bag', help='bag written by scenario_to_bag or session_to_bag with --boxes (default: the '
+    parser.add_argument('--bag', help='bag written by scenario_to_bag --boxes (default: the '
                         'first %d images of the demo)' % IMAGES)
     parser.add_argument('--separate', action='store_true', help='run each node in a process of its own')

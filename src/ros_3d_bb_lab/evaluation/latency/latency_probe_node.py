@@ -29,8 +29,6 @@ OUTPUTS = ((BOXES_TOPIC, Int32MultiArray), (BOXES3D_TOPIC, BoundingBox3DArray), 
 
 @parameters()
 class LatencyProbeParams(NamedTuple):
-    """Parameters of latency_probe_node."""
-
     record: str = Param('')
     seconds: float = Param(20.0)
 

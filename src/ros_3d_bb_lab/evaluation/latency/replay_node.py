@@ -16,8 +16,6 @@ from ros_3d_bb.nodes.common.startup import read_params
 
 @parameters()
 class ReplayParams(NamedTuple):
-    """Parameters of replay_node."""
-
     bag: str = Param('')
     rate: float = Param(30.0, limits=(0.001, 1000))
     boxes: bool = Param(False, 'Whether the 2D boxes in the bag are published, too.', section=SET_BY_LAUNCH)
@@ -26,7 +24,7 @@ class ReplayParams(NamedTuple):
 class ReplayNode(object):
     """Play the images of a bag forwards and backwards, which avoids jumps, with the time of publication as stamp.
 
-    The bag must be from `scenario_to_bag` or `session_to_bag`. Parameters: see `ReplayParams`; launch/latency.launch.
+    The bag must be from `scenario_to_bag`. Parameters: see `ReplayParams`; launch/latency.launch.
     """
 
     def __init__(self):

@@ -12,7 +12,7 @@ from ros_3d_bb_lab.evaluation.navigation.navigation_scenes import GOAL_M, RATE_H
 from ros_3d_bb_lab.evaluation.navigation.trial_result import summaries
 from ros_3d_bb_lab.evaluation.text_table import line_of, table_of
 
-MODES = 'ours', 'limited', 'none', 'laser', 'depth', 'visible'
+MODES = 'ours', 'limited', 'none', 'laser', 'visible'
 PLANNERS = 'dwa', 'teb'
 TRUE_BOXES = 'exact'
 TRIAL_TIMEOUT_S = 900.0
@@ -37,7 +37,6 @@ def run_trial(scene, mode, seed, folder, arguments):
 
 
 def run(arguments):
-    """Run all trials."""
     names = [TRUE_BOXES] + without_weights()
     if arguments.detector not in names and not os.path.isfile(arguments.detector):
         raise ValueError('--detector %s: %s or the path of a file expected' % (arguments.detector, ', '.join(names)))

@@ -19,28 +19,23 @@ CAMERAS = [{'name': name, 'mount': [0.17, side * 0.05, 0.20], 'yaw': side * 0.85
 
 
 def standing(random):
-    """A person stands in the way, facing anywhere."""
     return [_person((MEETING_X_M, _around(random, 0, .15)), facing=float(random.uniform(-3, 3)))], []
 
 
 def head_on(random):
-    """A person comes straight towards the robot."""
     y = _around(random, 0, .15)
     return [_person((10.0, y), _walk((-3.0, y), _around(random, 1.0, .2)))], []
 
 
 def crossing_left(random):
-    """A person crosses from the left when the robot arrives."""
     return [_crossing(random, 1)], []
 
 
 def crossing_right(random):
-    """A person crosses from the right when the robot arrives."""
     return [_crossing(random, -1)], []
 
 
 def overtaking(random):
-    """A person walks slowly ahead of the robot."""
     y = _around(random, 0, .1)
     return [_person((1.8, y), _walk((12.0, y), _around(random, .35, .05)))], []
 
@@ -77,7 +72,6 @@ SCENES = {scene.__name__: scene for scene in (standing, head_on, crossing_left, 
 
 
 def scenario_of(name, seed, rate_hz=RATE_HZ):
-    """Content of the scenario file of a scene."""
     random = np.random.RandomState([seed, sorted(SCENES).index(name)])
     people, furniture = SCENES[name](random)
     return {'duration': DURATION_S, 'rate': rate_hz, 'seed': seed, 'people': people,

@@ -1,5 +1,4 @@
 """ROS node that supervises one trial of the navigation benchmark."""
-import functools
 import json
 import threading
 import time
@@ -8,21 +7,18 @@ from typing import NamedTuple
 import rospy
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Twist
 from nav_msgs.msg import MapMetaData, OccupancyGrid, Odometry
-from sensor_msgs.msg import CameraInfo, Image, LaserScan, PointCloud2
+from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float32, Header, Time, UInt32
 from tf2_msgs.msg import TFMessage
 
-from ros_3d_bb.conversions.camera_msgs import DEPTH_TOPIC, INFO_TOPICS, topic_of
-from ros_3d_bb.conversions.image_msgs import imgmsg_to_depth
-from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, TRACKS_TOPIC, camera_from_msg, time_from,
-                                                   transform_from_msg)
-from ros_3d_bb.conversions.planner_msgs import points_to_msg
+from ros_3d_bb.conversions.camera_msgs import topic_of
+from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, TRACKS_TOPIC, time_from, transform_from_msg
 from ros_3d_bb.core.params import SET_BY_LAUNCH, Param, parameters
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.msg import BoundingBox3DArray, TrackedObjectArray
 from ros_3d_bb.nodes.common.startup import read_params
 from ros_3d_bb_lab.evaluation.navigation.trial_result import (CELL_M, SHINS_M, Pace, VisiblePeople, distance_m,
-                                                              occupancy, points_of, stops, was_driving)
+                                                              occupancy, stops, was_driving)
 from ros_3d_bb_lab.simulation.laser import FIELD_OF_VIEW, planar_pose, scan_ranges
 from ros_3d_bb_lab.simulation.ros.driven_robot import scan_to_msg
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import BASE_FRAME, MAP_FRAME, ODOM_FRAME, TRUTH_TOPIC
@@ -36,15 +32,12 @@ WARM_UP_S, LONGEST_S = 1.0, 30.0  # of the published time: with standing people 
 
 @parameters()
 class NavigationTrialParams(NamedTuple):
-    """Parameters of navigation_trial_node."""
-
     scenario: str = Param('')
     record: str = Param('')
     goal_x: float = Param(0.0, limits=(-1000, 1000))
     goal_y: float = Param(0.0, limits=(-1000, 1000))
     tracks: bool = Param(False, 'Whether the time waits for tracks.', section=SET_BY_LAUNCH)
     boxes: bool = Param(False, 'Whether the time waits for the 3D boxes of each camera.', section=SET_BY_LAUNCH)
-    cloud: bool = Param(False, 'Whether the points of the depth images are published.', section=SET_BY_LAUNCH)
     visible: bool = Param(False, 'Whether the true tracks of visible people are published.', section=SET_BY_LAUNCH)
     scan: bool = Param(False, 'Whether the scan of a planar laser is published.', section=SET_BY_LAUNCH)
 
@@ -60,7 +53,7 @@ class NavigationTrialNode(object):
     def __init__(self):
         self._params, = read_params(NavigationTrialParams)
         self._scenario = read_scenario(self._params.scenario)
-        self._pace, self._cameras = Pace(), {}
+        self._pace = Pace()
         self._sources = []  # names of the inputs of move_base for which the time waits
         self._pose, self._speeds_mps, self._clearances_m = None, [], []
         self._collisions, self._driving_collisions = 0, 0
@@ -87,25 +80,12 @@ class NavigationTrialNode(object):
             self._sources.append('scan')
             self._scan_pub = rospy.Publisher('scan', LaserScan, queue_size=10)
             rospy.Subscriber(TRUTH_TOPIC, TrackedObjectArray, self._publish_scan)
-        if self._params.cloud:
-            self._sources.append('cloud')
-            for mount in self._scenario.robot.mounts:
-                self._convert_depth_of(mount.name)
 
     def _wait_for(self, source, topic, kind):
         self._sources.append(source)
         rospy.Subscriber(topic, kind, lambda message: self._pace.heard(source, message.header.stamp.to_nsec()))
 
-    def _convert_depth_of(self, camera_name):
-        cloud_pub = rospy.Publisher(topic_of(camera_name, 'camera/points'), PointCloud2, queue_size=1)
-        rospy.Subscriber(topic_of(camera_name, INFO_TOPICS[1]), CameraInfo,
-                         lambda message: self._cameras.update({camera_name: camera_from_msg(message)}))
-        rospy.Subscriber(topic_of(camera_name, DEPTH_TOPIC), Image,
-                         functools.partial(self._on_depth, camera_name, cloud_pub),
-                         queue_size=1, buff_size=2 ** 24)
-
     def run(self):
-        """Run the trial and write the record."""
         self._map_pub.publish(map_message(self._scenario.room))
         worker = threading.Thread(target=self._run, daemon=True)  # publishing in the main thread can block on SIGINT
         worker.start()
@@ -171,12 +151,6 @@ class NavigationTrialNode(object):
             self._driving_collisions += was_driving(self._speeds_mps)
         self._collisions = message.data
 
-    def _on_depth(self, camera_name, cloud_pub, message):
-        if camera_name in self._cameras:
-            points_m = points_of(imgmsg_to_depth(message), self._cameras[camera_name])
-            cloud_pub.publish(points_to_msg(points_m, message.header))
-            self._pace.heard('cloud', message.header.stamp.to_nsec())
-
     def _publish_visible(self, message):
         message.objects = self._visible.of(message.objects)
         self._tracks_pub.publish(message)
@@ -192,7 +166,6 @@ class NavigationTrialNode(object):
 
 
 def map_message(room):
-    """Convert a scenario.Room to a map."""
     cells = occupancy(room)
     origin = Pose(Point(room.bounds[0], room.bounds[2], 0), Quaternion(0, 0, 0, 1))
     return OccupancyGrid(Header(frame_id=MAP_FRAME), MapMetaData(

@@ -12,7 +12,6 @@ OCCUPIED = 100
 STANDING_MPS, DRIVING_MPS = 0.05, 0.15
 CONTACT_SPEEDS = 3  # odometry of 60 ms
 SHINS_M = 0.15  # radius of a person at the height of a planar laser, both legs
-POINT_STEP_PX, FARTHEST_POINT_M = 8, 6.0
 
 
 class Pace(object):
@@ -31,11 +30,9 @@ class Pace(object):
 
     @property
     def sources(self):
-        """Names of the sources heard so far."""
         return set(self._heard_ns)
 
     def heard(self, source, time_ns):
-        """Note that a source has processed its inputs up to a time."""
         self._heard_ns[source] = time_ns
 
     def start(self, time_ns, needed):
@@ -67,16 +64,7 @@ class VisiblePeople(object):
         return [track for track in tracks if any(track.id in visible for visible in self._visible)]
 
 
-def points_of(depth, camera):
-    """Points (n, 3) of every `POINT_STEP_PX`-th pixel of a DepthImage up to `FARTHEST_POINT_M`, in the camera frame."""
-    v, u = (part.ravel() for part in np.mgrid[:depth.shape[0]:POINT_STEP_PX, :depth.shape[1]:POINT_STEP_PX])
-    depth_m, is_valid = depth.at(u, v)
-    is_valid &= depth_m <= FARTHEST_POINT_M
-    return camera.deproject(np.stack([u, v], axis=-1)[is_valid].astype(float), depth_m[is_valid])
-
-
 def distance_m(one, other):
-    """Distance of two positions in the plane."""
     return float(np.hypot(*np.subtract(one, other)))
 
 

@@ -8,25 +8,10 @@ import matplotlib.pyplot as plt  # noqa: E402
 
 SIZE_IN, DPI = (7.2, 4.2), 110
 COLUMNS = 3
-MANY_CLUSTERS = 12
 # Smallest RMS error of the depth of a plane: z² s / (f b), with the subpixel accuracy s and the baseline b of a D435
 # (Intel's values, thesis 5.2). The curve is fitted from 1.5 m on, as in the thesis.
 SUBPIXEL_PX, BASELINE_M, QUADRATIC_FROM_M = 0.08, 0.050, 1.5
 MEASURED, FITTED = '#0072b2', '#d55e00'  # different for all colour vision
-
-
-def layout(path, complete):
-    """View from above: true positions with the number of their measurements, and the estimates."""
-    places_m, counts = np.unique(complete.truth_m, axis=0, return_counts=True)
-    figure, axes = plt.subplots(figsize=(6.2, 4.8))
-    axes.plot(complete.measured_m[:, 0], complete.measured_m[:, 2], '.', color=FITTED, label='estimate')
-    axes.plot(places_m[:, 0], places_m[:, 1], 'x', color=MEASURED, markersize=8, label='true position')
-    for place_m, count in zip(places_m, counts):
-        axes.annotate('%d' % count, place_m, (5, 4), textcoords='offset points', fontsize=8)
-    axes.plot(0, 0, '^', color='0.3', markersize=11, label='camera')
-    axes.set_aspect('equal', 'datalim')
-    axes.margins(0.1)
-    _finish(figure, axes, path, 'X [m]', 'Z [m]', 'lower right')  # few measurements are beside the camera
 
 
 def sigmas(path, analysis):
@@ -77,21 +62,6 @@ def depth_rms(path, axis, camera):
                   label='theory: plane before a D435 (%g pixels, %g mm)' % (SUBPIXEL_PX, 1000 * BASELINE_M))
     axes.set_ylim(bottom=0)
     _finish(figure, axes, path, 'true Z [m]', 'RMS of the Z error [m]')
-
-
-def variances(path, axis, name):
-    """Variance of each cluster."""
-    figure, axes = plt.subplots(figsize=SIZE_IN)
-    positions = np.arange(len(axis.clusters))
-    axes.bar(positions, [cluster.variance_m2 for cluster in axis.clusters], color=MEASURED)
-    axes.axhline(axis.max_variance_m2, color=FITTED, linestyle='--',
-                 label='largest: %.5f m² (standard deviation %.4f m)' % (axis.max_variance_m2, axis.max_sigma_m))
-    axes.set_xticks(positions)
-    crowded = {'fontsize': 7, 'rotation': 90} if len(positions) > MANY_CLUSTERS else {}
-    axes.set_xticklabels(['%.2f\nn=%d' % (cluster.truth_m, cluster.count) for cluster in axis.clusters], **crowded)
-    axes.set_ylim(0, 1.2 * axis.max_variance_m2 or 1)
-    _finish(figure, axes, path, 'true %s of the cluster [m], number of measurements' % name,
-            'variance of the %s error [m²]' % name)
 
 
 def histograms(path, clusters, name):

@@ -1,13 +1,11 @@
 """Output of the noise analysis: a folder with a report, its figures, a summary and an error model, and a short text."""
 import json
 
-import numpy as np
-
 from ros_3d_bb.estimation.error_model import write_error_model
 from ros_3d_bb.sessions.plausibility import position_text
 from ros_3d_bb_lab.evaluation.html_report import figure, heading, html_report, paragraph, table
 from ros_3d_bb_lab.evaluation.noise.analysis import LEAST_IN_CLUSTER, summary_of
-from ros_3d_bb_lab.evaluation.noise.figures import depth_rms, error_by_truth, histograms, layout, sigmas, variances
+from ros_3d_bb_lab.evaluation.noise.figures import depth_rms, error_by_truth, histograms, sigmas
 from ros_3d_bb_lab.evaluation.noise.tables import LEAST_TO_TEST
 
 SIGNIFICANCE = 0.05  # of the normality test
@@ -55,28 +53,17 @@ def _summary(analysis, _drawn):
         paragraph('This report describes how far positions of people, as measured by a depth camera, are from their '
                   'true positions, and a model of these errors. Error is measured minus true. X is to the right of the '
                   'camera and Z ahead of it, in its optical frame.'), table('main results', header, rows)]
-    text = _bias_text(analysis)
-    if model is not None:
-        text += (' Validated at positions that were not used for the fit, the 95 %% ellipse of the model contains '
-                 '%.0f %% of the measurements, and the remaining error in the plane is %.3f m (RMSE).'
-                 % (100 * model.cross_validated.coverage_95, model.cross_validated.rmse_plane_m))
-    return pieces + [paragraph(text)]
+    if model is None:
+        return pieces
+    return pieces + [paragraph(
+        'Validated at positions that were not used for the fit, the 95 %% ellipse of the model contains %.0f %% of the '
+        'measurements, and the remaining error in the plane is %.3f m (RMSE).'
+        % (100 * model.cross_validated.coverage_95, model.cross_validated.rmse_plane_m))]
 
 
-def _bias_text(analysis):
-    biased = [cluster for cluster in analysis.z.clusters if abs(cluster.mean_m) > cluster.sigma_m]
-    if not biased:
-        return 'The mean error in Z nowhere exceeds the standard deviation.'
-    far = max(biased, key=lambda cluster: abs(cluster.mean_m))
-    return ('At Z = %.2f m the mean error in Z is %+.3f m, %.1f times the standard deviation there: inflating '
-            'obstacles by σ alone does not cover it.%s' % (
-                far.truth_m, far.mean_m, abs(far.mean_m) / max(far.sigma_m, 1e-6),
-                '' if analysis.model is None else ' The error model corrects the mean error.'))
-
-
-def _setup(analysis, drawn):
+def _setup(analysis, _drawn):
     inputs = analysis.inputs
-    camera, complete = inputs.z.camera, inputs.z.complete()
+    complete = inputs.z.complete()
     positions = len(set(map(tuple, complete.truth_m.tolist())))
     rows = [('date of the analysis', analysis.date),
             ('dates of the measurements (UTC)', inputs.z.dates or 'not stored'),
@@ -85,20 +72,9 @@ def _setup(analysis, drawn):
                 str(source.name) for source in (inputs.z, inputs.x, inputs.x_variance))))),
             ('measurements', '%d used with X and Z, at %d positions' % (len(complete.truth_m), positions)),
             ('left out', 'rejected or unusable: %d, outliers: %d' % (len(inputs.z.left_out), len(inputs.outliers)))]
-    if camera is not None:
-        rows += [('image', '%d × %d pixels' % camera[:2]), ('focal lengths', 'fx %.2f, fy %.2f pixels' % camera[2:4]),
-                 ('principal point', 'cx %.2f, cy %.2f pixels' % camera[4:6]),
-                 ('field of view', '%.1f° × %.1f°' % tuple(
-                     np.degrees(2 * np.arctan(size / (2 * focal))) for focal, size in zip(camera[2:4], camera[:2]))),
-                 ('distortion', '%s: %s' % (camera.distortion_model, ', '.join(
-                     '%g' % value for value in camera.distortion)) if camera.distortion else 'none')]
-    pieces = [heading('Measurements and camera'), table('measurements and camera', ('', 'value'), rows),
-              paragraph('A cluster is the set of all measurements with one true value of X, or of Z. Clusters of fewer '
-                        'than %d measurements are left out of the statistics of that axis.' % LEAST_IN_CLUSTER)]
-    if len(complete.truth_m):  # not tables of one axis
-        pieces.append(drawn('layout.png', 'true positions (number of measurements) and estimates, from above', layout,
-                            complete))
-    return pieces
+    return [heading('Measurements and camera'), table('measurements and camera', ('', 'value'), rows),
+            paragraph('A cluster is the set of all measurements with one true value of X, or of Z. Clusters of fewer '
+                      'than %d measurements are left out of the statistics of that axis.' % LEAST_IN_CLUSTER)]
 
 
 def _left_out(analysis, _drawn):
@@ -118,9 +94,9 @@ def _left_out(analysis, _drawn):
     return pieces + [
         paragraph('Outliers have a true position whose error is far from what the other measurements make likely: '
                   'probably a slip in the entry, or the box of another person. They are left out of all results.'),
-        table('outliers', ('measurement', 'true', 'estimate', 'would be plausible'), [
-            (outlier.name, position_text(outlier.truth_m), position_text(outlier.measured_m),
-             '–' if outlier.intended_m is None else position_text(outlier.intended_m)) for outlier in inputs.outliers])]
+        table('outliers', ('measurement', 'true', 'estimate'), [
+            (outlier.name, position_text(outlier.truth_m), position_text(outlier.measured_m))
+            for outlier in inputs.outliers])]
 
 
 def _z(analysis, drawn):
@@ -130,8 +106,7 @@ def _z(analysis, drawn):
             drawn('z_error.png', 'error in Z by true Z, and f(z)', error_by_truth, analysis.z, 'Z'),
             _cluster_table(analysis.z, 'Z', 'errors in Z by true Z'),
             drawn('z_rms.png', 'RMS error in Z by true Z, measured and theoretical (as Fig. 5.2 of the thesis)',
-                  depth_rms, analysis.z, analysis.inputs.z.camera),
-            drawn('z_variance.png', 'variance of the error in Z by true Z', variances, analysis.z, 'Z')]
+                  depth_rms, analysis.z, analysis.inputs.z.camera)]
 
 
 def _x(analysis, drawn):
@@ -144,8 +119,7 @@ def _x(analysis, drawn):
                              '%s measurements of people who are not truncated by the image border.'
                              % _count(analysis.x_variance)),
                    _cluster_table(analysis.x_variance, 'X', 'errors in X of people who are not truncated')]
-    return pieces + [drawn('x_variance.png', 'variance of the error in X by true X', variances, analysis.x_variance,
-                           'X')]
+    return pieces
 
 
 def _distributions(analysis, drawn):

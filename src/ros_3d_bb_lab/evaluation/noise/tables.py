@@ -41,11 +41,9 @@ class MeasurementTable(NamedTuple):
     dates: str = ''
 
     def complete(self):
-        """Select the measurements with x and z."""
         return self._part(np.isfinite(np.c_[self.measured_m[:, [0, 2]], self.truth_m]).all(axis=1))
 
     def whole(self):
-        """Select the measurements of people that are not truncated."""
         return self._part(~self.cut)
 
     def outliers(self):

@@ -2,29 +2,24 @@
 
 Detection errors are as measured in the thesis. Without recordings, pedestrian trajectories are generated.
 """
-import functools
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.estimation.error_model import read_error_model
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb_lab.evaluation.baselines.norfair_baseline import LIDAR, LIDAR_SCORE, Norfair
-from ros_3d_bb_lab.evaluation.baselines.oracle_association import outputs_with_perfect_association
 from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker, as_it_arrived
 from ros_3d_bb_lab.evaluation.defaults import data_folder, in_range
 from ros_3d_bb_lab.evaluation.text_table import line_of, table_of, transposed
 from ros_3d_bb_lab.evaluation.tracking.metrics import score_run, scores_of
-from ros_3d_bb_lab.evaluation.tracking.prediction_benchmark import predictions
-from ros_3d_bb_lab.evaluation.tracking.recorded_detections import read_recordings, with_error_model, with_sources
+from ros_3d_bb_lab.evaluation.tracking.recorded_detections import read_recordings
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import DRIVING, STANDING
 from ros_3d_bb_lab.evaluation.tracking.run_generator import SECONDS, simulate
 from ros_3d_bb_lab.evaluation.tracking.trajectories import COLUMNS, made_sequences, read_sequences
 
 RATE_SCORES = 'hota', 'idf1', 'id_switches'
 PEDESTRIANS_EVERY = 1, 2, 3, 6, 10  # 30, 15, 10, 5 and 3 Hz
-RECORDINGS_EVERY = 1, 2, 3  # 10, 5 and 3.3 Hz in KITTI
 
 
 class Contestant(NamedTuple):
@@ -36,7 +31,6 @@ class Contestant(NamedTuple):
 
 
 def outputs_of(make_tracker, run):
-    """Tracks that a tracker publishes after each image of a run."""
     tracker = make_tracker()
     return [tracker.update(image.stamp_ns, image.detections, image.view) for image in run.images]
 
@@ -57,7 +51,6 @@ def _norfair_outputs(make_tracker, run):
 
 CONTESTANTS_ON_DETECTIONS = (Contestant('ours', Tracker, outputs_of),
                              Contestant('library', Norfair, _norfair_outputs))
-BOUND = Contestant('perfect_association', Tracker, outputs_with_perfect_association)
 
 
 def compare(runs, contestants):
@@ -76,7 +69,7 @@ def compare(runs, contestants):
 
 def run(arguments):
     """Run the comparison and print it. Returns the settings and the scores of each tracker."""
-    if arguments.detections and not arguments.rates:
+    if arguments.detections:
         return _run_on_detections(arguments)
     sequences = read_sequences(arguments.data) if arguments.data else made_sequences(arguments.seed)
     names = [sequence.name for sequence in sequences]
@@ -85,49 +78,30 @@ def run(arguments):
     runs = (simulate(sequence, motion, (arguments.seed, repetition), seconds=arguments.seconds)
             for sequence in sequences for motion in (STANDING, DRIVING) for repetition in range(arguments.repetitions))
     if arguments.rates:
-        return _run_at_rates(list(runs), arguments)
-    trackers, prediction = compare(runs, CONTESTANTS), predictions(sequences)
-    print('\n'.join(table_of(transposed(trackers)) + ['predictions from true positions:']
-                    + table_of(transposed(prediction))))
+        return _run_at_rates(list(runs))
+    trackers = compare(runs, CONTESTANTS)
+    print('\n'.join(table_of(transposed(trackers))))
     return {'sequences': names, 'recorded': bool(arguments.data), 'seed': arguments.seed,
-            'repetitions': arguments.repetitions, 'seconds': arguments.seconds, 'trackers': trackers,
-            'prediction': prediction}
+            'repetitions': arguments.repetitions, 'seconds': arguments.seconds, 'trackers': trackers}
 
 
 def _run_on_detections(arguments):
-    """Run the comparison on recorded detections, as `run`."""
-    runs = list(read_recordings(arguments.detections, arguments.every, not arguments.no_odometry))
-    contestants = CONTESTANTS_ON_DETECTIONS
-    if arguments.error_model:
-        model = read_error_model(arguments.error_model)
-        runs = [with_error_model(run, model) for run in runs]
-        ours = contestants[0]._replace(make=functools.partial(Tracker, detector=model.detector))
-        contestants = (ours,) + contestants[1:]
-    trackers = compare(runs, contestants)
+    runs = list(read_recordings(arguments.detections, arguments.every))
+    trackers = compare(runs, CONTESTANTS_ON_DETECTIONS)
     print('\n'.join(table_of(transposed(trackers))))
-    return {'sequences': [run.name for run in runs], 'every': arguments.every, 'odometry': not arguments.no_odometry,
-            'error_model': arguments.error_model, 'trackers': trackers}
+    return {'sequences': [run.name for run in runs], 'every': arguments.every, 'trackers': trackers}
 
 
-def _run_at_rates(runs, arguments):
-    """Compare our tracker with perfect association by image rate, on the pedestrians, and on the recorded detections if
-    there are any. The difference is the loss by data association; what perfect association lacks, boxes do not show, or
-    the birth of tracks delays.
-    """
-    parts = [('pedestrians', runs, PEDESTRIANS_EVERY)]
-    if arguments.detections:
-        recordings = read_recordings(arguments.detections, 1, not arguments.no_odometry)
-        parts.append(('recorded_detections', [with_sources(run) for run in recordings], RECORDINGS_EVERY))
-    result = {part: {} for part, _runs, _rates in parts}
-    for part, runs, rates in parts:
-        for every in rates:
-            thinned = [run._replace(images=run.images[::every]) for run in runs]
-            gaps_ns = np.concatenate([np.diff([image.stamp_ns for image in run.images]) for run in thinned])
-            rate_hz = '%.1f' % (NS / np.median(gaps_ns))
-            result[part][rate_hz] = {name: {key: scores[key] for key in RATE_SCORES}
-                                     for name, scores in compare(thinned, (CONTESTANTS[0], BOUND)).items()}
-            for name, scores in result[part][rate_hz].items():
-                print(line_of(part, rate_hz + ' Hz', name, **scores), flush=True)
+def _run_at_rates(runs):
+    """Score our tracker on the pedestrians by image rate."""
+    result = {}
+    for every in PEDESTRIANS_EVERY:
+        thinned = [run._replace(images=run.images[::every]) for run in runs]
+        gaps_ns = np.concatenate([np.diff([image.stamp_ns for image in run.images]) for run in thinned])
+        rate_hz = '%.1f' % (NS / np.median(gaps_ns))
+        scores = compare(thinned, CONTESTANTS[:1])['ours']
+        result[rate_hz] = {key: scores[key] for key in RATE_SCORES}
+        print(line_of(rate_hz + ' Hz', **result[rate_hz]), flush=True)
     return result
 
 
@@ -137,14 +111,10 @@ def add_options(parser):
                         'it exists, otherwise generated trajectories)' % ','.join(COLUMNS))
     parser.add_argument('--detections', metavar='DIR', help='track recorded 3D detections instead: a folder of '
                         'recordings, see doc/benchmark_methods.md')
-    parser.add_argument('--rates', action='store_true', help='compare our tracker with perfect data association by '
-                        'image rate instead: the pedestrians, and the recordings of --detections if it is given')
+    parser.add_argument('--rates', action='store_true',
+                        help='score our tracker on the pedestrians by image rate instead')
     parser.add_argument('--every', type=in_range(int, 1), default=1, metavar='N',
                         help='of --detections: use each N-th image')
-    parser.add_argument('--no-odometry', action='store_true',
-                        help='of --detections: track in the frame of the camera, as without a pose of the robot')
-    parser.add_argument('--error-model', metavar='FILE', help='of --detections: correct the boxes by an error model '
-                        '(./run noise --recordings), and give the tracker their covariance (default: none)')
     parser.add_argument('--seed', type=in_range(int, 0, 2 ** 32 - 1), default=0, metavar='N',
                         help='random seed (default: 0)')
     parser.add_argument('--repetitions', type=in_range(int, 1), default=2, metavar='N',

@@ -78,7 +78,6 @@ def thesis_bias_m(depth_m):
 
 
 def half_width(range_m):
-    """Half of the angular width of a person."""
     return np.arcsin(BODY_RADIUS_M / np.maximum(range_m, BODY_RADIUS_M + 0.02))
 
 

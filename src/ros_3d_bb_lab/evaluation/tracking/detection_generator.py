@@ -6,7 +6,6 @@ import numpy as np
 from ros_3d_bb_lab.evaluation.tracking.d435_model import BODY_RADIUS_M, thesis_bias_m
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import bearing_of, from_frame, to_frame
 
-FALSE, DOUBLE = -1, -2  # instead of the ID of a person
 HARD_TO_SEE, EASY_TO_SEE = 0.3, 0.6  # visible share: no detection below the first, no occlusion misses from the second
 FOUND_WHEN_HARD = 0.4
 BEYOND_M = 0.2  # people are detected up to this distance beyond `farthest_m`
@@ -17,14 +16,13 @@ FALSE_SIDE_M, FALSE_DEPTH_M = 0.02, 0.04
 
 
 class SimulatedDetection(NamedTuple):
-    """3D box; `cut` is whether the image border truncates it, `source` the ID of the person, or FALSE or DOUBLE."""
+    """3D box; `cut` is whether the image border truncates it."""
 
     bearing: float
     depth_m: float
     width_m: float
     height_m: float
     cut: bool
-    source: int
 
 
 class DetectablePerson(NamedTuple):
@@ -77,7 +75,7 @@ class Detector(object):
             if self._is_found(person):
                 found.append(self._found(person, time_s))
                 if self._random.uniform() < self._camera.double_share:
-                    found.append(self._double(found[-1]))
+                    found.append(self._double(found[-1], person.person))
         found += self._false(pose)
         return [found[number] for number in self._random.permutation(len(found))]
 
@@ -108,14 +106,14 @@ class Detector(object):
                   + random.normal(0, camera.side_floor_m))
         width_m = 2 * BODY_RADIUS_M * seen.share * np.clip(random.normal(1, 0.15), 0.5, 1.6)
         height_m = self._height_m[person] + random.normal(0, 0.05)
-        return SimulatedDetection(seen.middle + side_m / seen.range_m, depth_m, width_m, height_m, seen.cut, person)
+        return SimulatedDetection(seen.middle + side_m / seen.range_m, depth_m, width_m, height_m, seen.cut)
 
-    def _double(self, box):
+    def _double(self, box, person):
         random = self._random
         depth_m = box.depth_m + abs(random.normal(0, DEEP_DOUBLE_M))
         side_m = box.depth_m * np.tan(box.bearing) + random.normal(0, SIDE_DOUBLE_M)
         return SimulatedDetection(np.arctan2(side_m, depth_m), depth_m, DOUBLE_WIDTH_M,
-                                  self._height_m[box.source] * random.uniform(0.6, 1), box.cut, DOUBLE)
+                                  self._height_m[person] * random.uniform(0.6, 1), box.cut)
 
     def _false(self, pose):
         random, found = self._random, []
@@ -123,5 +121,5 @@ class Detector(object):
             if forward_m > 0 and abs(np.arctan2(left_m, forward_m)) < self._camera.field_of_view / 2:
                 point_m = np.array([forward_m, left_m]) + random.normal(0, (FALSE_DEPTH_M, FALSE_SIDE_M))
                 found.append(SimulatedDetection(bearing_of(point_m), point_m[0], random.uniform(*FALSE_WIDTH_M),
-                                                random.uniform(*FALSE_HEIGHT_M), False, FALSE))
+                                                random.uniform(*FALSE_HEIGHT_M), False))
         return found

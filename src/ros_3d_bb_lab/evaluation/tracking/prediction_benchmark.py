@@ -2,9 +2,8 @@
 
 The data is a folder with a folder of CSV files for each kind. A file shows one person: `timestamp` (s), `x`, `y` (m).
 Recordings are resampled to each rate, with their true positions and with noise. The tracker gets one person at a time,
-in the order of appearance, without covariances: it learns the noise from earlier people. The plain filter is its Kalman
-filter, extrapolated with its velocity and its acceleration; the constant velocity is that of the last `STEP_S`, or of
-the last image, if that takes longer.
+in the order of appearance, without covariances: it learns the noise from earlier people. The constant velocity is that
+of the last `STEP_S`, or of the last image, if that takes longer.
 """
 import math
 import os
@@ -23,8 +22,6 @@ from ros_3d_bb_lab.evaluation.tracking.trajectories import read_rows
 PARAMS = TrackerParams(outlier_share=0.0, new_target_density=1e-9)
 HORIZON_S = 2.0
 SIZE_M = np.array([0.5, 0.5, 1.7])
-OBSERVED = 8  # steps of a sequence before predictions count
-MAX_STEP_ERROR_S = 0.05  # largest deviation of the time of a future position in a sequence
 COLUMNS = ('timestamp', 'x', 'y')
 AS_RECORDED_HZ = 10  # rate of the main result
 RATES_HZ = (30, 15, 10, 5, 3)
@@ -32,45 +29,11 @@ NOISES_M = {'true': 0.0, 'noise_5cm': 0.05}
 STEP_S = 0.1
 OBSERVED_S, FEWEST_OBSERVED = 0.7, 3  # duration and number of images before predictions count
 STANDING_MPS = 0.3  # people stand whose tracks are slower; chosen
-KEYS = ('cv_fde_2s_m', 'coverage_95_2s', 'ours_fde_2s_m', 'area_95_2s_m2', 'plain_coverage_95_2s', 'plain_fde_2s_m',
-        'plain_area_95_2s_m2')
-
-
-def predictions(sequences):
-    """Errors of predictions from the true positions of each `trajectories.Sequence`, as written by --json.
-
-    As in Schöller et al., What the Constant Velocity Model Can Teach Us About Pedestrian Motion Prediction (RA-L 2020),
-    a person is observed for 8 steps of the recording, and the constant velocity is that of the last step. Each later
-    position with a known future counts.
-
-    Returns {name: {cv_fde_2s_m, ours_fde_2s_m, ours_coverage_95_2s}}, and their means as 'mean'; None without data.
-    """
-    scores = {}
-    for sequence in sequences:
-        tracker = Tracker(PARAMS)
-        people = sorted(sequence.pedestrians, key=lambda person: person.start_s)
-        rows = [row for person in people for row in _person_errors(tracker, person)]
-        cv_m, is_inside, ours_m, _area = np.reshape(rows, (-1, 4)).T
-        scores[sequence.name] = {'cv_fde_2s_m': _mean(cv_m), 'ours_fde_2s_m': _mean(ours_m),
-                                 'ours_coverage_95_2s': _mean(is_inside)}
-    known = [values for values in scores.values() if values['cv_fde_2s_m'] is not None]
-    if known:
-        scores['mean'] = {key: _mean([values[key] for values in known]) for key in known[0]}
-    return scores
+KEYS = 'cv_fde_2s_m', 'coverage_95_2s', 'ours_fde_2s_m', 'area_95_2s_m2'
 
 
 def _mean(values):
     return float(np.mean(values)) if len(values) else None
-
-
-def _person_errors(tracker, person):
-    """Yield the error of the constant velocity, metres, and the `_errors` of the tracker, for each prediction."""
-    times_s, points_m = person.times_s, person.points_m
-    for row, track in enumerate(tracked(tracker, times_s, points_m)):
-        later = np.flatnonzero(np.abs(times_s - times_s[row] - HORIZON_S) < MAX_STEP_ERROR_S)
-        if row + 1 >= OBSERVED and len(later) and track is not None:
-            future_m = points_m[later[0]]
-            yield (_constant_error_m(times_s, points_m, row, 1, future_m),) + _errors(future_m, *_predicted(track))
 
 
 def read_clips(folder):
@@ -114,9 +77,6 @@ def scores_of(clips, rate_hz, noise_m=0.0, seed=0):
 
 
 def _clip_errors(tracker, recorded_s, recorded_m, rate_hz, noise_m, random):
-    """As `_person_errors`, of a clip at a rate with noise, and with the `_errors` of the plain filter and the speed of
-    the track.
-    """
     count = int((recorded_s[-1] - recorded_s[0]) * rate_hz + 1e-6) + 1
     times_s = recorded_s[0] + np.arange(count) / rate_hz
     true_m = np.column_stack([np.interp(times_s, recorded_s, values_m) for values_m in recorded_m.T])
@@ -127,8 +87,7 @@ def _clip_errors(tracker, recorded_s, recorded_m, rate_hz, noise_m, random):
         if track is not None and is_observed and row >= steps and row + ahead < count:
             future_m = true_m[row + ahead]
             yield ((_constant_error_m(times_s, seen_m, row, steps, future_m),)
-                   + _errors(future_m, *_predicted(track)) + _errors(future_m, *_extrapolated(track))
-                   + (np.linalg.norm(track.velocity_mps),))
+                   + _errors(future_m, *_predicted(track)) + (np.linalg.norm(track.velocity_mps),))
 
 
 def tracked(tracker, times_s, points_m):
@@ -145,15 +104,6 @@ def _predicted(track):
     """Position (2,) and covariance (2, 2) of a TrackedObject after `HORIZON_S`."""
     step = int(round(HORIZON_S / track.prediction_step_s)) - 1
     return track.prediction_m[step, :2], track.prediction_covariance_m2[step, :2, :2]
-
-
-def _extrapolated(track):
-    """Position (2,) and covariance (2, 2) of a TrackedObject after `HORIZON_S`, by its Kalman filter alone."""
-    position, cross, velocity = (track.covariance[rows, columns] for rows, columns in (
-        (slice(0, 2), slice(0, 2)), (slice(0, 2), slice(3, 5)), (slice(3, 5), slice(3, 5))))
-    spread_m2 = PARAMS.acceleration * HORIZON_S ** 3 / 3
-    return (track.position_m[:2] + HORIZON_S * track.velocity_mps[:2],
-            position + HORIZON_S * (cross + cross.T) + HORIZON_S ** 2 * velocity + spread_m2 * np.eye(2))
 
 
 def _constant_error_m(times_s, points_m, row, steps, future_m):

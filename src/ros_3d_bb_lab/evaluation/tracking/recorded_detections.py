@@ -14,10 +14,8 @@ import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera, transform_from, transform_points
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.association import assign, plane_distances
+from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb.tracking.types import OUT_OF_VIEW, VISIBLE, CameraView, Detection
-from ros_3d_bb_lab.evaluation.tracking.detection_generator import FALSE
-from ros_3d_bb_lab.evaluation.tracking.metrics import MATCHED_M
 from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S, UNSCORED_M, Image, RunTruth
 from ros_3d_bb_lab.evaluation.tracking.trajectories import pedestrian_of, read_rows
 
@@ -59,45 +57,10 @@ class RecordedRun(NamedTuple):
         return counted & ~((pixels[:, None] >= low) & (pixels[:, None] <= high)).all(axis=2).any(axis=1)
 
 
-def with_error_model(run, model):
-    """The RecordedRun with boxes that an `error_model.ErrorModel` corrects, and their covariances."""
-    return run._replace(images=tuple(
-        image._replace(detections=_corrected(image.detections, image.view.fixed_from_camera, model))
-        for image in run.images))
-
-
-def _corrected(detections, fixed_from_camera, model):
-    camera_from_fixed, rotation = np.linalg.inv(fixed_from_camera), fixed_from_camera[:3, :3]
-    corrected = []
-    for detection in detections:
-        center_m = model.corrected(transform_points(camera_from_fixed, detection.position_m))
-        covariance_m2 = rotation.dot(model.covariance(center_m)).dot(rotation.T)
-        corrected.append(detection._replace(position_m=transform_points(fixed_from_camera, center_m),
-                                            covariance_m2=covariance_m2))
-    return corrected
-
-
-def with_sources(run):
-    """The RecordedRun with the person that each box shows, for perfect association: people and boxes within `MATCHED_M`
-    are matched one to one, as many as possible, with the least sum of distances. The other boxes are false."""
-    return run._replace(images=tuple(image._replace(sources=_sources(image)) for image in run.images))
-
-
-def _sources(image):
-    sources = np.full(len(image.detections), FALSE)
-    if len(sources) and len(image.truth.ids):
-        places_m = np.array([detection.position_m for detection in image.detections])
-        distances_m = plane_distances(places_m, image.truth.position_m)
-        rows, columns = assign(np.where(distances_m <= MATCHED_M, distances_m, np.inf))
-        sources[rows] = image.truth.ids[columns]
-    return sources.tolist()
-
-
-def read_recordings(folder, every=1, with_odometry=True):
+def read_recordings(folder, every=1):
     """Yield the runs of the recordings in the subfolders of a folder, or of a folder that is itself a recording.
 
-    `every` uses each n-th image. Without odometry, the camera is assumed to stand still: the fixed frame moves with it,
-    and so does the truth.
+    `every` uses each n-th image.
 
     Raises ValueError if there is no recording, or a table has missing columns or invalid values; the message names the
     file.
@@ -107,10 +70,10 @@ def read_recordings(folder, every=1, with_odometry=True):
         raise ValueError('%s has no recording; folders with camera.json, %s expected'
                          % (folder, ', '.join('%s.csv' % name for name in sorted(TABLES))))
     for path in [os.path.join(folder, name) for name in names] or [folder]:
-        yield _read_recording(path, every, with_odometry)
+        yield _read_recording(path, every)
 
 
-def _read_recording(folder, every, with_odometry):
+def _read_recording(folder, every):
     camera = _camera(os.path.join(folder, 'camera.json'))
     tables = {name: read_rows(os.path.join(folder, name + '.csv'), columns.split(','), ('id', 'kind'))
               for name, columns in TABLES.items()}
@@ -119,41 +82,35 @@ def _read_recording(folder, every, with_odometry):
     cameras = {stamp: transform_from([pose[key] for key in ('x_m', 'y_m', 'z_m')],
                                      [pose[key] for key in ('qx', 'qy', 'qz', 'qw')])
                for stamp, pose in zip(stamps, poses)}
-    still = cameras[stamps[0]]
-    seen_from = {stamp: pose if with_odometry else still for stamp, pose in cameras.items()}
-    used_from = {stamp: np.eye(4) if with_odometry else still.dot(np.linalg.inv(pose))
-                 for stamp, pose in cameras.items()}  # from the fixed frame to that of the tracker
     are_logits = any(not 0 <= box['score'] <= 1 for box in detections)
     found, ignored = _by_stamp(detections), _by_stamp(tables['ignored'])
-    people = _People(tables['truth'], used_from)
+    people = _People(tables['truth'], set(stamps))
     images, unscored = [], {}
     for stamp in stamps[::every]:
-        view = CameraView(seen_from[stamp], camera, 'camera')
+        view = CameraView(cameras[stamp], camera, 'camera')
         boxes = [_detection(box, view.fixed_from_camera, are_logits) for box in found.get(stamp, [])]
-        images.append(Image(stamp, boxes, view, people.at(stamp, view), [], stamp, view))
-        unscored[stamp] = _unscored(ignored.get(stamp, []), used_from[stamp])
+        images.append(Image(stamp, boxes, view, people.at(stamp, view), stamp, view))
+        unscored[stamp] = _unscored(ignored.get(stamp, []))
     return RecordedRun(os.path.basename(os.path.normpath(folder)), tuple(images), unscored)
 
 
 class _People(object):
-    """Ground truth of people: their positions are those of the table, in the frame of the tracker at each stamp."""
+    """Ground truth of people: their positions are those of the table, at the stamps of images."""
 
-    def __init__(self, rows, used_from):
+    def __init__(self, rows, stamps):
         self._rows, self._curves = _by_stamp(rows), {}
         self._names = sorted(set(row['id'] for row in rows))
         for name in self._names:
-            known = [row for row in rows if row['id'] == name and _stamp_ns(row['t_s']) in used_from]
+            known = [row for row in rows if row['id'] == name and _stamp_ns(row['t_s']) in stamps]
             times_s = np.array([row['t_s'] for row in known])
-            points_m = np.reshape([_place(row, used_from[_stamp_ns(row['t_s'])]) for row in known], (-1, 3))[:, :2]
+            points_m = np.reshape([(row['x_m'], row['y_m']) for row in known], (-1, 2))
             cuts = np.flatnonzero(np.diff(times_s) > LONGEST_GAP_S) + 1
             self._curves[name] = [pedestrian_of(part_s, part_m) for part_s, part_m
                                   in zip(np.split(times_s, cuts), np.split(points_m, cuts)) if len(part_s) > 1]
-        self._used_from = used_from
 
     def at(self, stamp_ns, view):
         """RunTruth of an image; velocities and future positions are those of smoothed curves."""
         rows = self._rows.get(stamp_ns, [])
-        transform = self._used_from[stamp_ns]
         velocity_mps = np.full((len(rows), 2), np.nan)
         future_m = np.full((len(rows), len(HORIZONS_S), 2), np.nan)
         for number, row in enumerate(rows):
@@ -163,7 +120,7 @@ class _People(object):
                     known = row['t_s'] + HORIZONS_S <= curve.end_s
                     future_m[number, known] = curve.position_m(row['t_s'] + HORIZONS_S[known])
         status = np.array([VISIBLE if row['counts'] else OUT_OF_VIEW for row in rows], int)
-        positions_m = np.reshape([_place(row, transform)[:2] for row in rows], (-1, 2))
+        positions_m = np.reshape([(row['x_m'], row['y_m']) for row in rows], (-1, 2))
         ids = np.array([self._names.index(row['id']) for row in rows], int)
         pose = np.append(view.fixed_from_camera[:2, 3], np.arctan2(view.ahead[1], view.ahead[0]))
         return RunTruth(ids, positions_m, velocity_mps, future_m, status, pose)
@@ -171,20 +128,17 @@ class _People(object):
 
 def _detection(box, fixed_from_camera, is_logit):
     score = 1 / (1 + np.exp(-PLATT[0] * (box['score'] - PLATT[1]))) if is_logit else box['score']
-    return Detection(_place(box, fixed_from_camera), np.array([box['width_m'], box['width_m'], box['height_m']]),
+    place_m = transform_points(fixed_from_camera, np.array([box['x_m'], box['y_m'], box['z_m']]))
+    return Detection(place_m, np.array([box['width_m'], box['width_m'], box['height_m']]),
                      score=score)
 
 
-def _unscored(rows, transform):
+def _unscored(rows):
     """Places (n, 2) and regions (m, 4) of the rows of `ignored.csv` of one image."""
-    places_m = [_place(row, transform)[:2] for row in rows if row['kind'] != DONT_CARE]
+    places_m = [(row['x_m'], row['y_m']) for row in rows if row['kind'] != DONT_CARE]
     regions_px = [[row[key] for key in ('x1_px', 'y1_px', 'x2_px', 'y2_px')] for row in rows
                   if row['kind'] == DONT_CARE]
     return np.reshape(places_m, (-1, 2)), np.reshape(regions_px, (-1, 4))
-
-
-def _place(row, transform):
-    return transform_points(transform, np.array([row['x_m'], row['y_m'], row['z_m']]))
 
 
 def _stamp_ns(time_s):

@@ -64,14 +64,13 @@ class RunTruth(NamedTuple):
 class Image(NamedTuple):
     """Received image: inputs of a tracker, and ground truth.
 
-    `sources` are the person IDs of the `detections`, or FALSE or DOUBLE. `arrival_view` is from tf at `arrival_ns`.
+    `arrival_view` is from tf at `arrival_ns`.
     """
 
     stamp_ns: int
     detections: List[Detection]
     view: CameraView
     truth: RunTruth
-    sources: List[int]
     arrival_ns: int
     arrival_view: CameraView
 
@@ -199,7 +198,7 @@ def _images(true, odometry, times_s, walks, random):
         stamp_s = START_S + time_s + random.normal(0, TIMING.stamp_sigma_s)
         stamp_ns, arrival_ns = (int(round(when_s * NS)) for when_s in (stamp_s, START_S + arrived_s))
         yield Image(stamp_ns, [detection_of(box, view, CAMERA) for box in found], view, truth,
-                    [box.source for box in found], arrival_ns, view_of(later, CAMERA))
+                    arrival_ns, view_of(later, CAMERA))
 
 
 def _observe(walks, row, pose, odometry, camera):
@@ -235,7 +234,6 @@ def view_of(pose, camera):
 
 
 def detection_of(box, view, camera):
-    """Detection of a box from a camera with this view."""
     rotation = view.fixed_from_camera[:3, :3]
     point_m = (-box.depth_m * np.tan(box.bearing), CAMERA_HEIGHT_M - box.height_m / 2, box.depth_m)
     covariance_m2 = rotation.dot(camera.covariance_m2(box.bearing, box.depth_m)).dot(rotation.T)

@@ -17,15 +17,12 @@ PERIOD_S = 0.4  # of generated trajectories, as in common recordings
 
 
 class Pedestrian(NamedTuple):
-    """Person with a position and a velocity (n, 2) as functions of times (n,) from `start_s` to `end_s`, and the
-    recorded times (k,) and points (k, 2)."""
+    """Person with a position and a velocity (n, 2) as functions of times (n,) from `start_s` to `end_s`."""
 
     start_s: float
     end_s: float
     position_m: Any
     velocity_mps: Any
-    times_s: np.ndarray
-    points_m: np.ndarray
 
 
 class Sequence(NamedTuple):
@@ -84,7 +81,7 @@ def _sequence(source, name, rows):
 def pedestrian_of(times_s, points_m):
     """Fit a smooth curve through points (n, 2) at increasing times (n,), n > 1. Returns a Pedestrian."""
     curve = CubicSpline(times_s, _smoothed(times_s, points_m), bc_type='natural')
-    return Pedestrian(float(times_s[0]), float(times_s[-1]), curve, curve.derivative(), times_s, points_m)
+    return Pedestrian(float(times_s[0]), float(times_s[-1]), curve, curve.derivative())
 
 
 def _smoothed(times_s, points_m):

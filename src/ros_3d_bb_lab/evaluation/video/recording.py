@@ -21,8 +21,6 @@ FLOOR_IMAGES = 8  # that the pose of the camera is fitted to, as with `process_b
 
 
 class Person(NamedTuple):
-    """A marked person in one image."""
-
     id: int
     rect_px: Tuple[float, float, float, float]  # of the visible part
     visible: float  # share of the body

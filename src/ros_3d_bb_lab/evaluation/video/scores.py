@@ -44,7 +44,6 @@ class Pairs(NamedTuple):
 
     @property
     def false(self):
-        """Number of the rectangles that show no person."""
         return int(self.scored.sum()) - len(self.found)
 
 
@@ -130,7 +129,6 @@ def _person(tracks):
 
 
 def visible_tracks(step, tracker):
-    """The tracks of a Step that have a box in its image."""
     return [track for track in step.tracks[tracker] if track.status == VISIBLE and track.detection in step.rects]
 
 
@@ -146,7 +144,6 @@ def projected(track, view):
 
 
 def _is_on(rect, track, view):
-    """Whether the middle of a track is projected into a rectangle."""
     place = projected(track, view)
     if place is None:
         return False

@@ -27,7 +27,6 @@ class DrivenRobot(object):
         rospy.Subscriber('cmd_vel', Twist, self._on_command, queue_size=1)
 
     def restarted(self):
-        """Return the DrivenWorld at the start of the scene."""
         self._world, self._reported = DrivenWorld(self._simulator), 0
         self._collisions_pub.publish(UInt32(0))
         return self._world

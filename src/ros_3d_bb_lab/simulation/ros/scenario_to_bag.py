@@ -1,13 +1,16 @@
 """ROS messages of simulated scenes, and the command `scenario_to_bag`."""
+import argparse
 import itertools
+import sys
 
 import numpy as np
 from std_msgs.msg import Header
 
-from ros_3d_bb.bags.bag_writer import bag_command_parser, write_bag_of_command
+from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.conversions.camera_msgs import START_NS, TF_TOPIC, CameraFrame, frame_id_of, messages_of, topic_of
 from ros_3d_bb.conversions.perception_msgs import BOXES_TOPIC, boxes2d_to_msg, time_from, tracks_to_msg
+from ros_3d_bb.core.atomic_file import clean_up_on_sigterm
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb_lab.simulation.scenario import read_scenario, with_overrides
 from ros_3d_bb_lab.simulation.simulator import Simulator
@@ -57,8 +60,10 @@ def scenario_images(scenario, with_boxes=False):
 
 
 def scenario_to_bag():
-    """Run the command `scenario_to_bag`: render a scenario to a bag with ground truth."""
-    parser = bag_command_parser('scenario_to_bag', scenario_to_bag.__doc__)
+    """Run the command."""
+    parser = argparse.ArgumentParser(prog='scenario_to_bag',
+                                     description='Render a scenario to a bag with ground truth.')
+    parser.add_argument('--compression', choices=('none', 'bz2', 'lz4'), default='lz4', help='default: lz4')
     parser.add_argument('scenario', help='scenario file (YAML), see config/scenarios')
     parser.add_argument('bag', help='bag to write')
     parser.add_argument('--rate', type=float, metavar='HZ', help="images per second (default: the scenario's)")
@@ -66,11 +71,14 @@ def scenario_to_bag():
     parser.add_argument('--images', type=int, metavar='N', help='number of images, from the start (default: all)')
     parser.add_argument('--boxes', action='store_true', help='also write the true 2D boxes to yolo_bounding_box')
     arguments = parser.parse_args()
-
     if arguments.images is not None and arguments.images < 1:
         parser.error('--images %d: at least 1 expected' % arguments.images)
-
-    def images():
+    clean_up_on_sigterm()
+    try:
         scenario = with_overrides(read_scenario(arguments.scenario), arguments.rate, arguments.seed)
-        return itertools.islice(scenario_images(scenario, arguments.boxes), arguments.images)
-    write_bag_of_command(parser, arguments, images)
+        images = itertools.islice(scenario_images(scenario, arguments.boxes), arguments.images)
+        count = write_bag(images, arguments.bag, arguments.compression)
+    except (ValueError, OSError) as error:
+        print('scenario_to_bag: %s; no bag was written' % error, file=sys.stderr)
+        sys.exit(1)
+    print('%s: %d images' % (arguments.bag, count))

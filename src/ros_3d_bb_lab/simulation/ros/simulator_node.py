@@ -191,7 +191,6 @@ class SimulatorNode(object):
         self._limit_ns = message.data.to_nsec()
 
     def _render(self, number, state, stamp_ns):
-        """Render and publish an image in the thread of the renderer, one at a time."""
         self._wait_for_image()
         self._rendering = self._renderer.submit(self._publish_image, number, state, stamp_ns)
 
