@@ -51,7 +51,7 @@ IMAGES = 8
 SCENE = {'duration': IMAGES / 10, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}]}
 
 
-CODECS = {'plain': {}, 'compressed': {COLOR_TOPIC: 'jpeg', DEPTH_TOPIC: 'compressedDepth rvl'}}
+CODECS = {'plain': {}, 'compressed': {COLOR_TOPIC: 'jpeg', DEPTH_TOPIC: 'compressedDepth png'}}
 NAMES = {COLOR_TOPIC: COLOR_TOPIC + '/compressed', DEPTH_TOPIC: DEPTH_TOPIC + '/compressedDepth'}
 
 
