@@ -1,11 +1,15 @@
 import pathlib
 import re
 import xml.etree.ElementTree as ElementTree
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.core.yaml_loader import load_yaml
+from ros_3d_bb.tracking.types import CameraView
+from ros_3d_bb_lab.evaluation.gazebo.people_truth import PeopleTruth
 from ros_3d_bb_lab.simulation.gazebo_world import HEIGHT_M, PERSON_NAME, world_of
 from ros_3d_bb_lab.simulation.motion import person_motion
 from ros_3d_bb_lab.simulation.scenario import (Drive, Follow, Furniture, Mount, Move, Person, Robot, Room, Scenario,
@@ -96,3 +100,25 @@ def test_the_examples_of_a_scenario_are_valid(tmp_path):
     for other in ({'moves': [moves['to'], moves['turn'], {'wait': 1.0}]}, {'follow': robot.pop('follow')}):
         scenario_from(dict(content, robot=dict(robot, **other), people=[
             dict(content['people'][0], moves=[moves['to'], moves['wait']])]))
+
+
+AHEAD = CameraView(np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0.27], [0, 0, 0, 1.0]]))  # looks along x
+
+
+def states(paths, times_s):
+    """Model states of people on `paths` (functions of time), with other models."""
+    def pose(x, y):
+        return SimpleNamespace(position=SimpleNamespace(x=x, y=y))
+    for time_s in times_s:
+        names = ['room'] + [PERSON_NAME + str(number + 1) for number in range(len(paths))] + ['jackal']
+        people = [pose(*path(time_s)) for path in paths]
+        yield time_s, SimpleNamespace(name=names, pose=[pose(0, 0)] + people + [pose(9, 9)])
+
+
+def test_true_tracks_have_position_velocity_and_future_positions():
+    truth = PeopleTruth(states([lambda t: (4 + 0.5 * t, 1 - t)], np.arange(0, 5, 0.01)))
+    track, = truth.tracks_at(2 * NS, AHEAD)
+    np.testing.assert_allclose(track.position_m[:2], [5, -1], atol=1e-6)
+    np.testing.assert_allclose(track.velocity_mps, [0.5, -1, 0], atol=1e-6)
+    np.testing.assert_allclose(track.prediction_m[-1, :2], [6, -3], atol=1e-6)
+    assert (track.id, track.moving, track.prediction_step_s * len(track.prediction_m)) == (1, True, 2.0)

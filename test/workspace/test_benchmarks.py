@@ -8,7 +8,9 @@ from unittest import mock
 import pytest
 
 from ros_3d_bb_lab.evaluation.latency.latency_probe_node import LatencyProbeNode
+from ros_3d_bb_lab.evaluation.navigation.benchmark import MODES
 from support.bags import scene_bag
+from support.launching import loaded
 from support.masterless import masterless
 from support.processes import processes_naming
 from support.real_planners import planner_environment
@@ -67,3 +69,25 @@ def test_a_latency_probe_that_is_shut_down_early_writes_no_record(tmp_path, chec
         node._arrivals['markers'].extend([(0, 0)] * checks)
         node.measure()
     assert os.listdir(str(tmp_path)) == [] and not answers
+
+
+ARGUMENTS = ['scenario:=/some/scene.yaml', 'record:=/some/record.json']
+
+
+@pytest.mark.parametrize('mode', MODES)
+def test_modes_differ_in_what_move_base_knows_of_people(mode):
+    parameters, nodes = loaded('navigation_benchmark.launch', 'mode:=' + mode, *ARGUMENTS)
+    is_tracked = mode in ('ours', 'limited')
+    assert {'bbox3d_node', 'tracker_node'} & set(nodes) == ({'bbox3d_node', 'tracker_node'} if is_tracked else set())
+    assert parameters['/simulator_node/boxes'] == is_tracked
+    layers = [layer['name'] for layer in parameters['/move_base/local_costmap/plugins']]
+    assert layers == ['static_layer'] + {
+        mode: ['obstacle_layer', 'inflation_layer'] for mode in ('depth', 'laser', 'none')}.get(
+            mode, ['people_layer', 'prediction_layer'])
+    assert parameters['/move_base/DWAPlannerROS/sum_scores'] == (mode not in ('depth', 'laser', 'none'))
+    waits_for = [name for name in ('tracks', 'cloud', 'scan') if parameters['/navigation_trial_node/' + name]]
+    assert waits_for == {'depth': ['cloud'], 'laser': ['scan'], 'limited': ['tracks', 'scan'],
+                         'none': []}.get(mode, ['tracks'])
+    assert parameters.get('/speed_limit_node/use_scan') == (True if mode == 'limited' else None)
+    assert parameters['/navigation_trial_node/visible'] == (mode == 'visible')
+    assert parameters['/simulator_node/drive'] and parameters['/simulator_node/supervised']

@@ -12,8 +12,7 @@ from support.inputs import TARGETS, good_messages, send_image, transforms
 from support.masterless import masterless, on_the_wire
 
 START_NS, PERIOD_NS = 1000 * NS, NS // 30
-TEXTS = ('', 'no_such_frame', 'x' * 1000, '%s%n', 'do\x07g', ';stamp=1.000000000;stamp=x', ';scores=nan',
-         'boxes;stamp=0.000000000;frame=camera', 'bayer_rggb8', 'equidistant')
+TEXTS = '', 'no_such_frame', 'x' * 1000, 'do\x07g', ';stamp=1.000000000;stamp=x', ';scores=nan', 'bayer_rggb8'
 FLOATS = float('nan'), -1.0, 3e38
 DURATIONS = genpy.Duration(), genpy.Duration(-5), genpy.Duration(2 ** 31 - 1)
 EXTREME_TIMES = genpy.Time(), genpy.Time(0, 1), genpy.Time(2 ** 32 - 1, NS - 1)
@@ -49,7 +48,7 @@ def others(kind, value, stamp_ns):
     if 'int' in kind:
         bits = int(kind.lstrip('uint'))
         low, high = (0, 2 ** bits - 1) if kind.startswith('u') else (-2 ** (bits - 1), 2 ** (bits - 1) - 1)
-        return {low, high, min(value + 1, high)}
+        return {low, high}
     return {'string': TEXTS, 'duration': DURATIONS, 'bool': (not value,)}[kind]
 
 

@@ -18,10 +18,11 @@ from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.nodes.common import master, startup, subscribers
 from ros_3d_bb.nodes.common.detector_output import DetectorWorker
+from ros_3d_bb.nodes.common.diagnostics import Diagnostics
 from ros_3d_bb.nodes.common.startup import Part
 from ros_3d_bb.nodes.common.tf_lookup import Transforms
 from support.masterless import masterless
-from support.ros import header_at
+from support.ros import header_at, wait_until
 
 IMAGE = Image(header=header_at(1000))
 
@@ -196,3 +197,36 @@ def test_transforms_are_kept_when_time_goes_back_by_less_than_a_jump(back_s, is_
         connections.now = STAMP - rospy.Duration(back_s)
         connections.send('/tf', TFMessage([link('map', 'rear')]))
         assert bool(transforms.can_transform_core('map', 'front', STAMP)[0]) is is_kept
+
+
+def test_a_master_that_hangs_is_queried_once_for_all_silent_inputs():
+    """Each failed query takes two seconds, in which nothing is published on /diagnostics."""
+    silent = [subscribers.Input('topic', Image) for _input in range(3)]
+    for number, each in enumerate(silent):
+        each.subscriber = mock.Mock(resolved_name='/topic%d' % number)
+    query = mock.Mock(side_effect=socket.timeout('timed out'))
+    with mock.patch.multiple(subscribers, _inputs=silent, published_topics=query, SILENT_S=-1.0), \
+            mock.patch('rospy.get_rostime', lambda: rospy.Time(1)):
+        monitor = subscribers.InputMonitor()
+        sentences = [sentence for _check in range(2) for _event, sentence in monitor.faults()]
+    assert query.call_count == 1
+    assert sentences == ['no messages on /topic%d, and the master does not respond (timed out)' % number
+                         for number in range(3)] * 2
+
+
+def test_the_diagnostics_continue_after_a_failed_report():
+    path = 'ros_3d_bb.nodes.common.diagnostics.'
+    with mock.patch('rospy.Publisher') as publisher, mock.patch('rospy.logwarn') as log, \
+            mock.patch('rospy.get_rostime', return_value=rospy.Time(1)), mock.patch(path + 'PERIOD_S', 0.01):
+        publish = publisher.return_value.publish
+        publish.side_effect = [ZeroDivisionError('by nothing')] + 1000 * [None]
+
+        def reported(name):
+            return [shown.value for call in publish.call_args_list for shown in call[0][0].status[0].values
+                    if shown.key == name]
+        Diagnostics().record_latency(rospy.Time(0, 200000000))
+        wait_until(lambda: publish.call_count >= 3 and reported('latency'), 'another report')
+    assert reported('latency')[0].startswith('mean 800.0 ms')
+    assert 'by nothing' in log.call_args[0][1]
+    status, = publish.call_args[0][0].status
+    assert (status.name, status.message) == (rospy.get_name()[1:] + ': pipeline', 'no input yet')
