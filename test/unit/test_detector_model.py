@@ -36,7 +36,7 @@ def run():
         truth = RunTruth(np.arange(people), places_m, None, None, np.full(people, VISIBLE), None)
         detections = [at(*place_m, covariance_m2=None) for place_m in measured_m[found]]
         stamp_ns = int(round((1 + time_s) * NS))
-        taken.append(Image(stamp_ns, detections, VIEW, truth, [], stamp_ns, VIEW))
+        taken.append(Image(stamp_ns, detections, VIEW, truth, stamp_ns, VIEW))
     return RecordedRun('made', tuple(taken), None)
 
 
