@@ -68,7 +68,6 @@ def _prepare(_app, name, source):
 
 
 def _write_first_page(app, _exception):
-    """A page at the root of the site, which leads to the README."""
     with open(os.path.join(app.outdir, 'index.html'), 'w') as stream:
         stream.write('<!DOCTYPE html><title>%s</title><meta http-equiv="refresh" content="0; url=%s.html">\n'
                      % (project, root_doc))

@@ -44,7 +44,6 @@ def pytest_report_header(config):
 
 @pytest.hookimpl(hookwrapper=True)
 def pytest_make_collect_report(collector):
-    """Skip files that cannot be imported."""
     report = (yield).get_result()
     missing = re.search(r"No module named '(\w+)", str(report.longrepr)) if report.failed else None
     if missing and collector.config.getoption('--leave-out') and missing.group(1) in missing_requirements():
@@ -98,7 +97,6 @@ def official_output(tmp_path_factory):
 
 @pytest.fixture(scope='session')
 def reader(tmp_path_factory):
-    """Runs the commands of the README."""
     from support.reader import Reader
     return Reader(tmp_path_factory.mktemp('reader'))
 

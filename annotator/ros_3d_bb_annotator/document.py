@@ -221,7 +221,6 @@ def _existing(measurement, folder):
 
 
 def _has_end_of_png(path):
-    """Whether a PNG file ends with its last chunk, IEND."""
     with open(path, 'rb') as stream:
         stream.seek(-min(os.path.getsize(path), 8), os.SEEK_END)
         return stream.read(4) == b'IEND'

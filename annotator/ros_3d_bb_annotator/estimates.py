@@ -77,7 +77,6 @@ class Estimates(object):
                           position_m[[0, 2]], np.array(truth_m[::2]))
 
     def _position(self, measurement, depth):
-        """Position (3,) of the selected person of a measurement, or None."""
         box = measurement.estimate(depth, self._document.camera, estimator_named(ESTIMATOR))
         return None if box is None else box.center_m
 

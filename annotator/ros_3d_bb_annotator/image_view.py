@@ -145,7 +145,6 @@ class ImageView(QtWidgets.QWidget):
         self.update()
 
     def _move_center(self, *center):
-        """Move the visible part, which stays inside the image."""
         margin = 0.5 / self._zoom
         self._center = tuple(min(max(share, margin), 1 - margin) for share in center)
         self.update()
@@ -177,11 +176,9 @@ class ImageView(QtWidgets.QWidget):
         return all(0 <= value < size for value, size in zip(pixel, self._size))
 
     def _point_at(self, u, v):
-        """Move the cursor to a pixel, or remove it if the pixel is outside the image."""
         self.cursor = (u, v) if self._is_inside((u, v)) else None
         self.pointed.emit()
         self.update()
 
     def _point_near(self, event):
-        """Move the cursor to the mouse position, clipped to the image."""
         self._point_at(*(min(max(value, 0), size - 1) for value, size in zip(self._pixel(event), self._size)))

@@ -78,7 +78,6 @@ class AnnotatorWindow(QtWidgets.QMainWindow):
         return True
 
     def _refresh_document(self):
-        """Show changes of the session by other programs."""
         before = self.measurement
         try:
             if not self.document.refresh():

@@ -101,7 +101,6 @@ def _paint_box(painter, transform, box_px, color, stroke):
 
 
 def _paint_label(painter, corner, text, color):
-    """Paint text on a background above its left corner."""
     if not text:
         return
     metrics = painter.fontMetrics()

@@ -191,7 +191,6 @@ def _readout_text(cursor, depth, camera):
 
 
 def _read_panels(document, number):
-    """Read the Panels of a measurement, and its DepthImage or None."""
     color, color_problem = _read_or_error(document.color, number)
     depth, depth_problem = _read_or_error(document.depth, number)
     shown = None if depth is None else colorize_depth(depth_to_grey(depth, DEPTH_RANGE_M))
@@ -199,7 +198,6 @@ def _read_panels(document, number):
 
 
 def _image_of(rgb):
-    """Convert an image (height, width, 3), uint8, RGB, or None to a QImage or None."""
     if rgb is None:
         return None
     rgb = np.ascontiguousarray(rgb)

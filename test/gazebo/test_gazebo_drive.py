@@ -24,7 +24,6 @@ DRIVE = scenario_from({'duration': DRIVE_S, 'room': {'bounds': [-3, 11, -4, 4]},
 
 
 def clearance_m(models, yaw):
-    """Distance between the rectangle of the robot and the nearest person."""
     rotation = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
     return min(np.linalg.norm(np.maximum(np.abs(rotation.dot(place_m - models[ROBOT])) - HALF_ROBOT_M, 0))
                for name, place_m in models.items() if name != ROBOT) - PERSON_M

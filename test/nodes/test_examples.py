@@ -66,7 +66,6 @@ def test_the_robot_stops_near_people_and_without_tracks():
         transforms = rospy.Publisher('/tf_static', TFMessage, queue_size=1, latch=True)
         with Recorder('cmd_vel', Twist) as velocities:
             def comes_to(speed_mps, *people, **options):
-                """Repeat tracks and commands until the robot has this speed."""
                 def has_it():
                     if not options.get('without_tracks'):
                         tracks.publish(tracks_at(*people))

@@ -31,7 +31,6 @@ def pipeline_stage():
 
 @pytest.fixture
 def stage(pipeline_stage):
-    """All people of the first scene are tracked."""
     track_the_first_scene(pipeline_stage)
     return pipeline_stage
 

@@ -78,7 +78,6 @@ class DrivenRobot(object):
 
     @property
     def place_m(self):
-        """Position (2,) of the robot in the map."""
         return np.linalg.inv(self.odom_from_map(self.seconds)).dot(level(*self._pose))[:2, 3]
 
     def _on_cmd_vel(self, message):

@@ -26,7 +26,6 @@ def test_without_a_display_the_error_names_the_option():
 
 
 def entries(folder):
-    """The measurements in a session, which may not exist yet."""
     return read_session(folder).frames if os.path.exists(os.path.join(folder, 'frames.json')) else ()
 
 

@@ -25,7 +25,6 @@ def messages_in(path, *topics):
 
 
 def scene_bag(path, scene, with_boxes=False):
-    """Write a bag of a scene, the content of a scenario file. Returns its path."""
     write_bag(scenario_images(scenario_from(scene), with_boxes), str(path))
     return str(path)
 

@@ -42,7 +42,6 @@ def each(topics, change):
 
 
 def with_matrix(message, factor):
-    """Multiply the intrinsics of a camera_info."""
     message.K = [value * factor for value in message.K[:8]] + [1.0]
     message.P = [value * factor for value in message.P[:10]] + [1.0, 0.0]
 
@@ -68,7 +67,6 @@ def in_frame(frame_id):
 
 
 def with_frames(names):
-    """Rename frames everywhere."""
     def changed(topic, message, time):
         message = copy.deepcopy(message)
         if topic == '/tf':

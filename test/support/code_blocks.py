@@ -12,7 +12,6 @@ Block = namedtuple('Block', 'page line language text')
 
 
 def blocks_in(page):
-    """Blocks of a page, given by its path in the package."""
     with open(os.path.join(ROOT, page), encoding='utf-8') as stream:
         text = stream.read()
     return [Block(page, text.count('\n', 0, match.start()) + 1, match.group(1), match.group(2))

@@ -47,8 +47,6 @@ def _yolov5():
 
 
 class Target(NamedTuple):
-    """A node under test."""
-
     make: Callable
     params: dict
     output: str  # topic on which it responds to valid messages, if there is one
@@ -87,7 +85,6 @@ def good_messages(stamp_ns):
 
 
 def transforms(stamp_ns):
-    """Transforms from the map to the camera."""
     return TFMessage(transform_messages(time_from(stamp_ns), [
         ('map', 'base_link', np.eye(4)), ('base_link', 'camera', transform_from((0, 0, 0), OPTICAL_ROTATION))]))
 

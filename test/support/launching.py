@@ -69,12 +69,10 @@ def dumped(launch_file, packages, *arguments, **environment):
 
 
 def given_to_stand_ins(parameters):
-    """The arguments of stand-ins, {argument: text}, without empty ones."""
     return {key[len('/stub/'):]: value for key, value in parameters.items() if key.startswith('/stub/') and value}
 
 
 def loaded(launch_file, *arguments):
-    """Parameters {name: value} and nodes {name: node} that roslaunch would set and start."""
     loader, config = roslaunch.xmlloader.XmlLoader(resolve_anon=False), roslaunch.config.ROSLaunchConfig()
     loader.load(os.path.join(ROOT, 'launch', launch_file), config, argv=list(arguments), verbose=False)
     return ({name: parameter.value for name, parameter in config.params.items()},

@@ -25,7 +25,6 @@ class Publisher(object):
         self.topic, self.kind, self.count, self.newest, self.connections = topic, kind, 0, None, 1
 
     def publish(self, message):
-        """Serialize a message, as rospy does."""
         self.newest = on_the_wire(message)
         self.count += 1
 

@@ -8,7 +8,6 @@ TEST = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
 
 def is_missing(module):
-    """Whether a module such as `onnx` or `torch.export` is not installed."""
     try:
         return importlib.util.find_spec(module) is None
     except ImportError:  # of its package
@@ -16,7 +15,6 @@ def is_missing(module):
 
 
 def missing_requirements():
-    """Names of the modules in requirements*.txt that are not installed."""
     names = set()
     for name in ('requirements.txt', 'requirements_no_deps.txt'):
         with open(os.path.join(TEST, name)) as stream:

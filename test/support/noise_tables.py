@@ -23,7 +23,6 @@ def rows_of(repetitions=6):
 
 
 def write_table(path, rows, columns=COLUMNS):
-    """Write rows below a header; returns the path as text."""
     with open(str(path), 'w', newline='') as stream:
         writer = csv.writer(stream)
         writer.writerow(columns)

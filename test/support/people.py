@@ -22,7 +22,6 @@ START_NS = 1000 * NS
 
 
 def view_from(x, y, height_m=1.0, camera='', **angles_deg):
-    """The view of a camera at a place, with the angles of `mounted`."""
     transform = mounted(height_m, **angles_deg)
     transform[:2, 3] = x, y
     return CameraView(transform, CAMERA, camera)
@@ -50,7 +49,6 @@ def play(tracker, seconds, detections_at, rate_hz=30, start_s=0.0, view=VIEW):
 
 
 def standing(*places):
-    """`detections_at` of people who stand at places (x, y)."""
     return lambda _time_s: [at(*place) for place in places]
 
 
@@ -59,5 +57,4 @@ def ids(objects):
 
 
 def all_ids(published):
-    """IDs of the tracks of all images."""
     return {track.id for objects in published for track in objects}

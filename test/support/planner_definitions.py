@@ -90,25 +90,21 @@ SEPARATOR = '\n' + '=' * 80 + '\n'
 
 
 def _installed(kind):
-    """The class of a message of an installed package."""
     package_name, name = kind.split('/')
     return getattr(importlib.import_module(package_name + '.msg'), name)
 
 
 def _own_text(kind):
-    """The definition of one message, without those of its fields."""
     return DEFINITIONS[kind] if kind in DEFINITIONS else _installed(kind)._full_text.split(SEPARATOR)[0]
 
 
 def _fields(kind):
-    """The types of a message's fields, with their packages."""
     if kind in DEFINITIONS:
         return [line.split()[0] for line in DEFINITIONS[kind].strip().splitlines()]
     return _installed(kind)._slot_types
 
 
 def _kinds_in(kind):
-    """The messages that a message is made of, itself first."""
     kinds = [kind]
     for field in _fields(kind):
         if '/' in field:
@@ -118,12 +114,10 @@ def _kinds_in(kind):
 
 @functools.lru_cache(maxsize=None)
 def message_class(kind):
-    """The class of a message such as 'people_msgs/People'."""
     text = SEPARATOR.join([_own_text(kind)] + ['MSG: %s\n%s' % (name, _own_text(name)) for name in _kinds_in(kind)[1:]])
     return genpy.dynamic.generate_dynamic(kind, text)[kind]
 
 
 def package(name):
-    """The `msg` module of a package."""
     return types.SimpleNamespace(**{kind.split('/')[1]: message_class(kind) for kind in DEFINITIONS
                                     if kind.startswith(name + '/')})

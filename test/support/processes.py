@@ -31,7 +31,6 @@ def cpu_load(cores):
 
 
 def processes_naming(text):
-    """The number of processes with a text in their command line."""
     found = 0
     for path in glob.glob('/proc/[0-9]*/cmdline'):
         with contextlib.suppress(OSError), open(path) as stream:  # a process may have ended
@@ -51,7 +50,6 @@ def killed_and_back(node, meanwhile):
 
 @contextlib.contextmanager
 def hanging(node):
-    """A node is stopped within the block."""
     pid = pid_of(node)
     os.kill(pid, signal.SIGSTOP)
     try:

@@ -61,7 +61,6 @@ class Reader(object):
         (self.cache / 'venv' / 'installed').write_text('%s  -\n' % sha1(wanted).hexdigest())  # the format of sha1sum
 
     def typed(self, block):
-        """Script of a block, with paths of this machine."""
         text = block.text.replace('/opt/ros/noetic/', '%s/' % self.etc)
         return '. %s/stand_ins/reader.sh\n%s' % (SUPPORT, text)
 
@@ -83,7 +82,6 @@ class Reader(object):
             yield graph
 
     def screen(self):
-        """DISPLAY of a virtual screen, which ends with the tests."""
         if self._display is None:
             with mock.patch.dict(os.environ):
                 start_screen()
@@ -99,7 +97,6 @@ class Graph(object):
         self._output = processes.enter_context(tempfile.NamedTemporaryFile())
 
     def start(self, command, **options):
-        """Start a process."""
         process = self._processes.enter_context(running(
             command, env=self.environment, stdin=subprocess.DEVNULL, stdout=self._output, stderr=subprocess.STDOUT,
             **options))

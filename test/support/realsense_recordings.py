@@ -57,7 +57,6 @@ def _stream(kind, uid, pixel_format, bytes_per_pixel, camera):
 
 
 def intrinsics_of(camera, model=None):
-    """librealsense's intrinsics of one of the cameras above."""
     intrinsics = rs.intrinsics()
     intrinsics.width, intrinsics.height, intrinsics.fx, intrinsics.fy, intrinsics.ppx, intrinsics.ppy = camera[:6]
     intrinsics.model = model or (rs.distortion.inverse_brown_conrady if camera.distortion else rs.distortion.none)
@@ -81,7 +80,6 @@ def sloping_depth(scale_m=0.001):
 
 
 def colored(number):
-    """A colour image whose red is its number."""
     image = np.zeros((COLOR_CAMERA.height, COLOR_CAMERA.width, 3), np.uint8)
     image[..., 0], image[:, :100, 1], image[:50, :, 2] = number, 200, 90
     return image

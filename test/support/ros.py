@@ -63,7 +63,6 @@ class Recorder(object):
         return self
 
     def wait_for(self, count, timeout_s=TIMEOUT_S):
-        """Wait for the first `count` messages."""
         wait_until(lambda: len(self.messages) >= count, '%d messages on %s' % (count, self.topic), timeout_s)
         return self.messages[:count]
 
@@ -74,7 +73,6 @@ class Recorder(object):
 
 
 def publisher(topic, kind):
-    """A publisher with a subscriber."""
     result = rospy.Publisher(topic, kind, queue_size=100)
     wait_until(lambda: result.get_num_connections() > 0, 'a subscriber on ' + topic)
     return result

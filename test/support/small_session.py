@@ -44,7 +44,6 @@ def read_json(folder):
 
 
 def change_json(folder, edit):
-    """Let a function change the content of frames.json in place."""
     content = read_json(folder)
     edit(content)
     with open(os.path.join(str(folder), 'frames.json'), 'w') as stream:

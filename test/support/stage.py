@@ -73,7 +73,6 @@ class Stage(object):
             time.sleep(0.1 / speed)
 
     def step(self):
-        """Send the next image, and wait for its tracks."""
         assert self.tries(TIMEOUT_S), 'no tracks of the image of %.3f' % (self.now_ns / NS)
 
     def tries(self, timeout_s):
@@ -99,7 +98,6 @@ class Stage(object):
             fault, limit, self.tracks.messages[-1:]))
 
     def ids(self):
-        """The track IDs of the people, {name: id}."""
         message = self.tracks.messages[-1]
         _round, people = self._sent[message.header.stamp.to_nsec()]
         return {_name_of(track, people): track.id for track in message.objects}
@@ -129,7 +127,6 @@ class Stage(object):
                     track.id, self._names[track.id], name)
 
     def _recent_people(self, stamp_ns):
-        """People in the latest images, {name: position}."""
         people = {}
         for other_ns in range(stamp_ns, stamp_ns - int(SHOWN_S * NS), -PERIOD_NS):
             other_round, others = self._sent.get(other_ns, (None, {}))
@@ -144,7 +141,6 @@ def _timeout_s(messages, sent):
 
 
 def _within(timeout_s, condition):
-    """Whether a condition becomes true within a timeout in real time."""
     deadline_s = time.monotonic() + timeout_s
     while not condition():
         if time.monotonic() > deadline_s:
@@ -163,7 +159,6 @@ def _scene(number):
 
 
 def _name_of(track, people):
-    """Name of the person at the position of a track, or None."""
     position = track.pose.pose.position
     near = [name for name, position_m in people.items()
             if np.hypot(position.x - position_m[0], position.y - position_m[1]) < NEAR_M]

@@ -13,7 +13,6 @@ FRAMES_PER_PLACE = 5
 
 
 def write_synthetic_session(folder):
-    """Write the session; returns the folder."""
     random = np.random.RandomState(1)
     for name in ('color', 'depth'):
         os.makedirs(os.path.join(folder, name), exist_ok=True)

@@ -45,7 +45,6 @@ class Rig(TrackingStage):
 
     @property
     def newest(self):
-        """The latest Result that `send` has not returned."""
         return self._results[-1]
 
     def send(self, stamp_ns, camera='', frame_id=None, count=1, z=3.0):
@@ -53,7 +52,6 @@ class Rig(TrackingStage):
         return self.send_boxes(boxes(stamp_ns, frame_id or camera or 'camera', [(0.0, 0.0, z)] * count), camera)
 
     def send_boxes(self, message, camera=''):
-        """A BoundingBox3DArray. Returns the Result, or None."""
         self.add_boxes(message, self.now_ns, camera)
         return self._results.pop() if self._results else None
 
@@ -70,7 +68,6 @@ class Play(object):
         self.transforms, self.counts = self.rig.transforms, self.rig.events.counts
 
     def run(self, seconds, cameras=None, count=1):
-        """Let time pass."""
         end_ns = self.now_ns + int(seconds * NS)
         cameras = self.cameras if cameras is None else cameras
         self._due_ns = {camera: max(due_ns, self.now_ns) for camera, due_ns in self._due_ns.items()}
@@ -99,7 +96,6 @@ class Play(object):
 
     @property
     def ids(self):
-        """IDs of the tracks in the newest result."""
         return [track.id for track in [result for _now_ns, _camera, result in self.results if result][-1].tracks]
 
 

@@ -55,12 +55,10 @@ class Driver(object):
         self.settle()
 
     def click(self, widget, place, modifiers=Qt.NoModifier):
-        """Click at a position (QPointF) in a widget."""
         QtTest.QTest.mouseClick(widget, Qt.LeftButton, modifiers, place.toPoint())
         self.settle()
 
     def drag(self, widget, start, end, modifiers=Qt.NoModifier):
-        """Press at a position in a widget, move, and release at another one."""
         QtTest.QTest.mousePress(widget, Qt.LeftButton, modifiers, start.toPoint())
         for place in ((start + end) / 2, end):  # QTest.mouseMove presses no button
             QtWidgets.QApplication.sendEvent(widget, QtGui.QMouseEvent(
@@ -92,7 +90,6 @@ class Driver(object):
         return replies[0]
 
     def wait_for(self, condition):
-        """Let the program run until `condition()`."""
         for _ in range(TRIES):
             if condition():
                 return
@@ -110,5 +107,4 @@ class Driver(object):
 
 
 def opened(folder):
-    """The measurements of a session, as another program reads them."""
     return Document(folder).measurements

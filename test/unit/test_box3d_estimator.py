@@ -63,7 +63,6 @@ def test_no_estimate_without_valid_depth(depth, scale_m, dtype):
 
 
 def foreground(depth, rect, *others, camera=CAMERA):
-    """The box of the first of several rectangles."""
     rects = [rect] + list(others)
     return estimate_foreground(depth, rects, of(camera), [PERSON_CLASS] * len(rects))[0]
 

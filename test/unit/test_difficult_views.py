@@ -56,17 +56,14 @@ class Scene(object):
 
     @property
     def depths_m(self):
-        """True depths of the people."""
         return [transform_points(self.camera_from_map, person.position_m)[2] for person in self.frame.people]
 
     def boxes(self, rects_px, labels=None, knows_tilt=True):
-        """The Box3D of each rectangle, or None."""
         return estimate_boxes(DepthImage(self.frame.depth_mm, 0.001), rects_px, self.camera,
                               estimator_named('foreground'), labels=labels,
                               level_from_camera=level_rotation(self.camera_from_map[:3, 2]) if knows_tilt else LEVEL)
 
     def error_m(self, person, box):
-        """Error in the plane."""
         return np.linalg.norm((transform_points(self.map_from_camera, box.center_m) - person.position_m)[:2])
 
 

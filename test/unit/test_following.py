@@ -19,7 +19,6 @@ def person(number, x, y, status=VISIBLE, vx=0.0, vy=0.0, first_s=0.0):
 
 
 def selected(selector, seconds, *tracks, **params):
-    """ID of the selected track."""
     track = selector.select(tracks, int(seconds * NS), ORIGIN, PARAMS._replace(**params))
     return None if track is None else track.id
 

@@ -14,7 +14,6 @@ AREAS = IgnoredAreas(polygons_from(SQUARE))
 
 
 def marked(*places):
-    """Detections of people at places (x, y)."""
     return [at(*place, is_ignored=AREAS.contains(place, (0, 0))) for place in places]
 
 

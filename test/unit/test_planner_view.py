@@ -93,7 +93,6 @@ def test_positions_ahead_are_those_of_a_walk_leg_by_leg(track, ahead_s):
 
 
 def segment_distances(points, start, end):
-    """Distances (n,) of points (n, 2) from a segment."""
     along = end - start
     share = np.clip((points - start).dot(along) / max(along.dot(along), 1e-12), 0, 1)
     return np.linalg.norm(points - start - share[:, None] * along, axis=1)

@@ -73,7 +73,6 @@ IMAGES = 8
 
 
 def compared(images):
-    """The fault of pairs of a colour image and a DepthImage."""
     comparison = EdgeComparison()
     for color, depth in images:
         comparison.add(color, depth)

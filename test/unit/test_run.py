@@ -8,7 +8,6 @@ RUN = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, os.par
 
 
 def run(*arguments):
-    """Exit status, standard output and standard error."""
     result = subprocess.run(['bash', RUN] + list(arguments), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                             stderr=subprocess.PIPE, universal_newlines=True)
     return result.returncode, result.stdout, result.stderr

@@ -35,7 +35,6 @@ def yolov5():
 
 
 def simulator_of(path):
-    """The simulator of a scene, which renders each image once."""
     simulator = Simulator(read_scenario(path))
     simulator.frame = functools.lru_cache(maxsize=None)(simulator.frame)
     return simulator

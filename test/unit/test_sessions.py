@@ -49,7 +49,6 @@ def append_error(target, record):
 
 @pytest.fixture
 def target(tmp_path):
-    """Folder of a session that does not exist yet."""
     return str(tmp_path / 'a campaign' / 'session')
 
 

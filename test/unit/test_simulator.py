@@ -16,7 +16,6 @@ START_NS = 1600000000 * 10 ** 9
 
 
 def scene(*people, **others):
-    """Scenario of 3 s without noise."""
     values = dict(duration=3.0, rate=10.0, seed=4, depth_noise=False, color_noise=0.0, people=people)
     return Scenario(**dict(values, **others))
 

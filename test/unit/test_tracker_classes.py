@@ -14,7 +14,6 @@ def at(x, y, label='person', score=0.0, index=0):
 
 
 def play(tracker, images):
-    """The tracks after each image, a list of detections."""
     return [tracker.update(number * NS // 30, detections, VIEW) for number, detections in enumerate(images)]
 
 

@@ -32,7 +32,6 @@ def track(track_id, place_m, velocity_mps=VELOCITY_MPS, covariances=(None, None)
 
 
 def scores(run, make):
-    """Scores of the tracks `make(number of the image, truth)` of each image."""
     return scores_of([score_run(run, [make(number, image.truth) for number, image in enumerate(run.images)])])
 
 

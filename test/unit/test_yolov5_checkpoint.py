@@ -22,7 +22,6 @@ def path(tmp_path):
 
 @pytest.fixture(scope='module')
 def content(tmp_path_factory):
-    """Content of a valid checkpoint."""
     path = tmp_path_factory.mktemp('weights') / 'weights.pt'
     write_checkpoint(str(path), LAYOUT)
     return path.read_bytes()

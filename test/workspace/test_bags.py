@@ -27,14 +27,12 @@ from support.bags import changed_bag, messages_in, scene_bag, session_images
 
 @pytest.fixture(scope='module')
 def session(session_folder):
-    """The first frames of a session."""
     session = read_session(session_folder)
     return session._replace(frames=session.frames[:7])
 
 
 @pytest.fixture(scope='module')
 def messages(session, tmp_path_factory):
-    """{topic: messages} of a bag at 10 Hz."""
     path = str(tmp_path_factory.mktemp('bag') / 'session.bag')
     assert write_bag(session_images(session, 10.0, with_boxes=True), path) == 7
     with rosbag.Bag(path) as bag:

@@ -129,7 +129,6 @@ def camera(weights):
 
 @pytest.fixture
 def image(session_folder):
-    """A colour image with a person, and the person's box."""
     session = read_session(session_folder)
     return read_color(session.frames[15], session.camera), session.frames[15].boxes_px[0]
 
@@ -140,7 +139,6 @@ def newest(camera):
 
 
 def sent(camera, image, stamp_ns=START_NS):
-    """The newest boxes after an image."""
     camera.send(COLOR_TOPIC, fill_image(Image(header=header_at(stamp_ns)), image, 'rgb8'))
     return newest(camera)
 
@@ -191,7 +189,6 @@ def test_a_slow_network_gets_smaller_images_as_the_range_permits_and_then_fewer_
 
 @pytest.fixture
 def viewer(tmp_path):
-    """viewer_node, whose session is a folder to be created."""
     parameters, _nodes = loaded('viewer.launch', 'session:=%s' % (tmp_path / 'a session'), 'window:=false')
     with masterless({name.rpartition('/')[2]: value for name, value in parameters.items()}) as connections:
         connections.node, connections.folder = ViewerNode(), parameters['/viewer_node/session']

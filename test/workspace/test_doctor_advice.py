@@ -42,7 +42,6 @@ def sound(tmp_path_factory):
 
 
 def run(main, *arguments):
-    """Run a command in this process. Returns what it prints."""
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed), \
             mock.patch.object(sys, 'argv', ['command'] + list(arguments)), contextlib.suppress(SystemExit):

@@ -31,7 +31,6 @@ def fields_of(message):
 
 
 def others(kind, value, stamp_ns):
-    """Other values of a field of a type such as `float64[9]`."""
     element, bracket, length = kind.partition('[')
     if isinstance(value, bytes):
         return [value[:-1], value + bytes(40), bytes(len(value)), b'\xff' * len(value)]
@@ -53,13 +52,11 @@ def others(kind, value, stamp_ns):
 
 
 def changes_of(message, stamp_ns):
-    """Changes (number of the field, other value) of one field each."""
     return [(number, value) for number, (part, name, kind) in enumerate(fields_of(message))
             for value in others(kind, getattr(part, name), stamp_ns)]
 
 
 def changed(message, number, value):
-    """A copy of a message with another value of one field."""
     message = on_the_wire(message)
     part, name, _kind = list(fields_of(message))[number]
     setattr(part, name, value)

@@ -81,7 +81,6 @@ def test_what_is_published_once_is_no_silent_input(subscribe, kind, before, coun
 
 @pytest.fixture
 def now_s():
-    """The clock of the machine, as [seconds]."""
     seconds = [1000.0]
     with mock.patch('time.monotonic', lambda: seconds[0]):
         yield seconds
@@ -131,7 +130,6 @@ def test_the_transform_is_that_of_the_stamp():
 
 @pytest.fixture
 def transforms():
-    """tf knows neither camera."""
     with masterless():
         made = Transforms(wait_s=0.0)
         made.set_transform(link('map', 'base_link'), 'test')

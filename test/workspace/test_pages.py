@@ -58,7 +58,6 @@ def connected(name):
 
 
 def documented(name, section):
-    """{name: type} in the docstrings."""
     return {entry.name: entry.kind for entry in NODES[name].sections.get(section, ())}
 
 
@@ -110,7 +109,6 @@ def text_of(path):
 
 
 def prose_of(page):
-    """A page without its blocks of code."""
     return re.sub(r'^```.*?^```$', '', text_of(page), flags=re.DOTALL | re.MULTILINE)
 
 
@@ -137,7 +135,6 @@ PARAMETERS = {name: table_of(types_of(name)) for name in TARGETS}
 
 
 def accepts(name, values):
-    """Whether a node starts with these parameters; a network has the classes of the pages."""
     with masterless(dict(TARGETS[name].params, **values)), mock.patch.object(Blind, 'names', COCO + ['wheelchair']):
         return TARGETS[name].make() is not None
 

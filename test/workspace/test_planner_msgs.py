@@ -42,7 +42,6 @@ def test_the_definitions_used_here_are_the_published_ones(kind):
 
 
 def sent(write, package_name, tracks, frame_id='map'):
-    """The message of a conversion, as its subscribers receive it."""
     return on_the_wire(write(tracks, header_at(STAMP_NS, frame_id), package(package_name)))
 
 

@@ -41,7 +41,6 @@ def session_bag(session_folder, tmp_path):
 
 
 def run_tool(*arguments):
-    """Output of the command, which must succeed."""
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed), pytest.raises(SystemExit) as ended:
         main([str(argument) for argument in arguments])

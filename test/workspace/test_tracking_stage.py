@@ -98,7 +98,6 @@ def test_boxes_in_the_frame_of_the_body_of_the_camera_are_rejected(rig):
 
 
 def add_images(rig, stamp_ns, encoding='16UC1'):
-    """camera_info, and a depth image of a wall 1.5 m ahead."""
     header, depth_mm = Header(stamp=time_from(stamp_ns), frame_id='camera'), np.full((48, 64), 1500, '<u2')
     rig.views[''].add_camera_info(CameraInfo(header=header, width=64, height=48, K=[60, 0, 32, 0, 60, 24, 0, 0, 1]))
     image = Image(header=header, width=64, height=48, encoding=encoding, step=128, data=depth_mm.tobytes())

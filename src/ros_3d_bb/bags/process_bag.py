@@ -53,7 +53,6 @@ def main(arguments: Optional[List[str]] = None) -> None:
 
 
 def _settings_from(given: argparse.Namespace) -> Settings:
-    """Return the settings for the command line arguments. Raises ValueError, OSError or yaml.YAMLError."""
     settings = Settings()._replace(detector=given.detector, names=_names(given.remap), compression=given.compression,
                                    keep=None if given.keep is None else tuple(t.lstrip('/') for t in given.keep))
     for option, node in FILES:
@@ -92,7 +91,6 @@ def _check_names(settings: Settings) -> None:
 
 
 def _with_camera(settings: Settings, given: argparse.Namespace) -> Settings:
-    """Return settings with the orientation of the camera that the command line gives. Raises ValueError."""
     if given.image_rotation:
         for node in IMAGE_NODES:
             settings = with_params(settings, node, image_rotation=given.image_rotation)
@@ -114,7 +112,6 @@ def _with_camera(settings: Settings, given: argparse.Namespace) -> Settings:
 
 
 def _given_pose(given: argparse.Namespace) -> Tuple[float, float, float]:
-    """Return height, tilt and roll of the camera on the command line. Raises ValueError."""
     if not (0 < given.camera_height < HIGHEST_M and abs(given.camera_tilt) < math.pi / 2):
         raise ValueError('--camera-height is %g and --camera-tilt %g; more than 0 and less than %g m, and less than '
                          'pi / 2 rad expected' % (given.camera_height, given.camera_tilt, HIGHEST_M))
@@ -151,7 +148,6 @@ def read_params(path: Optional[str], defaults: Tuple[Any, ...]) -> Tuple[Any, ..
 
 
 def _reason(source: str, settings: Settings, error: Exception) -> str:
-    """Return why a bag was not processed, as a sentence that names it."""
     if isinstance(error, BagError):
         return str(error)
     if isinstance(error, (ValueError, OSError)):
@@ -180,7 +176,6 @@ def _summary(events: EventCounter, settings: Settings) -> List[str]:
 
 
 def _why_no_tracks(events: EventCounter, placed: Callable[[str], str]) -> str:
-    """Return the likely cause if no track was written, as a sentence."""
     counts = events.counts
     event = max(set(events.sentences) - {POSE_FITTED, NOT_KEPT}, key=lambda each: (counts[each], each), default=None)
     if event is not None and counts[event] > counts.get('images tracked', 0):

@@ -115,7 +115,6 @@ def _distort_brown(rays: np.ndarray, coefficients: Tuple[float, ...], is_inverse
 
 
 def _solved_by_opencv(model: str, coefficients: np.ndarray, images: np.ndarray) -> np.ndarray:
-    """Undistort images (n, 1, 2) to rays (n, 1, 2)."""
     import cv2
     if model == EQUIDISTANT:
         # OpenCV returns 0 next to the axis, and wrong rays for images farther than pi/2, which `undistort` rejects.

@@ -72,7 +72,6 @@ def _check_size(width: int, height: int) -> None:
 
 
 def _decode_with_opencv(data: bytes, unchanged: bool) -> np.ndarray:
-    """Decode a JPEG or PNG to BGR, or unchanged, which must give one channel."""
     import cv2
     flags = cv2.IMREAD_UNCHANGED if unchanged else cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
     try:

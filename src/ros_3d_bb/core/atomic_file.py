@@ -43,7 +43,6 @@ def check_writable(path: str) -> None:
 
 
 def _name_beside(path: str, prefix: str, suffix: str) -> str:
-    """A name in the folder of `path` that no file has: 64 random bits."""
     return os.path.join(os.path.dirname(path), prefix + secrets.token_hex(8) + suffix)
 
 

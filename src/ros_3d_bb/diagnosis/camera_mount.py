@@ -59,7 +59,6 @@ def _scaled(pairs, factor):
 
 
 def _people_in(pairs, camera, turns):
-    """Number of people in images that are turned clockwise by quarter turns."""
     detector, count = DepthPeople(), 0
     for color, depth in pairs:
         found = detector.detect(np.ascontiguousarray(turned_image(color, turns)), turned_depth(depth, turns),

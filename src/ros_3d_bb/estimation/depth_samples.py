@@ -81,7 +81,6 @@ class RectSamples(object):
         self._layer: Optional[Layer] = None  # not known, or all samples are masked
 
     def _along(self, axis: int) -> np.ndarray:
-        """Positions along an axis of the level frame, metres."""
         x, y, z = self._rays
         to_x, to_y, to_z = self._level_axes[axis]
         return ((to_x * x + (to_y * y + to_z * z)) * self._depth_m).ravel()
@@ -152,7 +151,6 @@ class RectSamples(object):
         return sum(body_mm[:count]) / (1000 * count), sum(body_mm[-count:]) / (1000 * count)
 
     def _part(self, samples: np.ndarray, rect_px: Rect) -> np.ndarray:
-        """View of the part of samples that is in a rectangle."""
         left, top, right, bottom = rect_px
         rows, columns = self._rows, self._columns
         return samples.reshape(self.shape)[_rank(rows, top):_rank(rows, bottom),

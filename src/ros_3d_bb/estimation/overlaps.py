@@ -90,7 +90,6 @@ class Overlaps(object):
         return bool(group) and group == self._objects[other].kind.group
 
     def _is_nearer(self, other: int, number: int) -> bool:
-        """Whether the other of two objects is nearer."""
         farther_mm = self._layers[number].trunk_mm - self._layers[other].trunk_mm
         if abs(farther_mm) >= TRUNK_HALF_DEPTH_MM:
             return farther_mm > 0
@@ -110,7 +109,6 @@ class Overlaps(object):
         return self._objects[number].samples.share_beside(self._objects[other].rect_px, self._layers[number])
 
     def _is_small(self, number: int) -> bool:
-        """Whether an object that is not truncated is too small for its layer."""
         each = self._objects[number]
         x1, y1, x2, y2 = each.rect_px
         size_m = max(x2 - x1, y2 - y1) * self._layers[number].trunk_mm / (1000 * self._camera.fy)

@@ -77,7 +77,6 @@ class CameraPoseNode(object):
                 self._publish(message.header.stamp)
 
     def _publish(self, stamp):
-        """Publish the pose. Raises ValueError if tf contains it already."""
         link = self._transforms.link_to_root(self._frame_world, self._stage.frame_id, self._stage.floor_from_camera)
         self._broadcaster.sendTransform(transform_messages(stamp, [link]))
         self._is_done = True

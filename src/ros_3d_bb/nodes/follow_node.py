@@ -134,7 +134,6 @@ class FollowNode(object):
             self._goal_pub.publish(pose_to_msg(*goal, header=header))
 
     def _stop(self):
-        """Publish a zero command or cancel the goal, once."""
         self._follower.stop()
         if self._is_driving and self._params.output == GOAL:
             self._cancel_pub.publish(GoalID())

@@ -215,7 +215,6 @@ class PlannerBridgeNode(object):
         topic.send(tracks, stamp_ns, received)
 
     def _empty_outdated(self, _event):
-        """Empty the outputs whose tracks are older than ~timeout."""
         with self._diagnostics.rejecting('outputs'), self._lock:
             now_ns = _now_ns()
             self._jumps.see('ROS time', now_ns)

@@ -98,7 +98,6 @@ class SpeedLimitNode(object):
             self._limit_pub.publish(Float32(self._limit(self._velocity) or 0.0))
 
     def _limit(self, velocity):
-        """Return the highest safe speed; None without recent tracks."""
         around = self._tracks.around()
         if around is None:
             if self._tracks.newest() is None:  # otherwise, there is no transform

@@ -176,7 +176,6 @@ class ViewerNode(object):
             return done, self._answer
 
     def _stored(self):
-        """Store the newest snapshot and return a message about it. Raises ValueError or OSError on failure."""
         if not self._params.session:
             raise ValueError('no session is given; start the viewer with session:=FOLDER')
         snapshot = self._snapshot_to_store()

@@ -38,7 +38,6 @@ class CameraPipeline(object):
         self._estimate, self._events, self._on_boxes3d, self._has_estimator = estimate, events, on_boxes3d, True
 
     def _on_match(self, trigger: Trigger, depth_msg: Image, camera: Camera) -> None:
-        """Process the messages of one stamp."""
         if not isinstance(trigger, Boxes2D):
             self._offer(trigger, depth_msg, camera)
             return

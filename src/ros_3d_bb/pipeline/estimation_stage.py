@@ -129,7 +129,6 @@ class EstimationStage(object):
                           % (factor, factor * unit_m, unit_m))
 
     def _usable_boxes(self, boxes2d: Boxes2D) -> Boxes2D:
-        """Return the Boxes2D whose rectangles are neither empty nor reversed."""
         boxes = boxes2d.boxes
         is_usable = (boxes[:, 0] < boxes[:, 2]) & (boxes[:, 1] < boxes[:, 3])
         for rect_px in boxes[~is_usable].tolist():

@@ -195,7 +195,6 @@ class PeoplePipeline(object):
 
     def _boxes2d(self, camera_name: str, header: Header, image: np.ndarray, detections: Detections,
                  names: Sequence[str]) -> Optional[Int32MultiArray]:
-        """Return the message of Detections, None if it is not published."""
         if not len(detections.boxes) and not self._publish_empty:
             return None
         message = detections2d_to_msg(detections, names, header, image.shape[1::-1])

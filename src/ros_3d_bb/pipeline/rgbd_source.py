@@ -110,7 +110,6 @@ class RgbdSource(object):
         return frame.turned(turns_for(self._params.image_rotation, frame.up))
 
     def _aligned(self, depth: DepthImage, depth_frame: str, camera: Camera) -> Tuple[Any, str]:
-        """Return a depth image with the pixels of colour, and the frame of the colour camera."""
         if self._params.depth == RAW:
             frame_id = self._params.frame_id or self._color_frame
             registration = self._registration.geometry(depth, depth_frame, camera, frame_id)

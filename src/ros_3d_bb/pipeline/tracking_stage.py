@@ -135,7 +135,6 @@ class TrackingStage(object):
                 self._end_ignored()
 
     def _end_ignored(self) -> None:
-        """End the tracks in ignored places, which have started there."""
         if self._newest_pose is not None:
             self._tracker.delete_at(self.ignored.seen_from(self._poses.values(), self._newest_pose))
 
@@ -221,7 +220,6 @@ class TrackingStage(object):
                               'not tracked; choose a faster detector' % (period_ns / NS, LONGEST_NS / NS))
 
     def _silent_cameras(self, newest_ns: int) -> List[str]:
-        """Names of the cameras whose newest boxes are older than ~camera_timeout."""
         timeout_s = self._params.camera_timeout or float('inf')
         return [name for name in self.views
                 if newest_ns - self._boxes_ns.get(name, float('-inf')) > timeout_s * NS]

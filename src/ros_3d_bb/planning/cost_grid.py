@@ -79,7 +79,6 @@ def _largest_presence(centers_m, covariances_m2, radius_m):
 
 
 def _diagonals(matrices):
-    """Diagonals (k, 2, 1) of matrices (k, 2, 2)."""
     return np.diagonal(matrices, axis1=1, axis2=2)[:, :, np.newaxis]
 
 

@@ -196,7 +196,6 @@ def _normalized_distance(track, seen, stamp_ns):
 
 
 def _expected_m(seen, stamp_ns):
-    """Position (2,) where a lost track, a _Seen, is expected."""
     return position_after(seen.track, min((stamp_ns - seen.stamp_ns) / NS, LONGEST_PREDICTION_S))[:2]
 
 
@@ -281,5 +280,4 @@ def is_reached(goal, robot_from_tracks):
 
 
 def _position_of(robot_from_tracks):
-    """Position (2,) of the robot in the frame of the tracks."""
     return np.linalg.inv(robot_from_tracks)[:2, 3]

@@ -159,7 +159,6 @@ def _safe_speed(distances_to, velocity, params, most_mps, pose_age_s):
 
 
 def _path(velocity, lengths_m):
-    """Places (n, 2) at distances (n,) along the path with this velocity."""
     x, y, rate = velocity
     speed_mps = math.hypot(x, y)
     turn = lengths_m * (rate / speed_mps if speed_mps else 0.0)

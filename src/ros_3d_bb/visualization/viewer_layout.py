@@ -112,6 +112,5 @@ def text_image(lines, warnings, width_px):
 
 
 def _write(image, text, place_px):
-    """Draw text with a dark outline, which is readable on any background."""
     for ink, thickness in (((0, 0, 0), 3), (INK, 1)):
         cv2.putText(image, text, place_px, FONT, FONT_SCALE, ink, thickness, cv2.LINE_AA)

@@ -39,7 +39,6 @@ class Rectangle(NamedTuple):
         return bool(bounds[0] < x_min and x_max < bounds[1] and bounds[2] < y_min and y_max < bounds[3])
 
     def _axes(self):
-        """Unit vectors (2, 2) along length and width."""
         c, s = np.cos(self.yaw), np.sin(self.yaw)
         return np.array([[c, s], [-s, c]])
 

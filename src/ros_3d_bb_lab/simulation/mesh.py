@@ -88,7 +88,6 @@ def box(size_m, color, random):
 
 
 def _side(size, axis, side):
-    """One side of a box as a grid of faces."""
     u, v = (axis + 1) % 3, (axis + 2) % 3
     counts = [int(np.ceil(size[a] / CELL_M)) + 1 for a in (u, v)]
     grid_u, grid_v = np.meshgrid(*[np.linspace(-size[a] / 2, size[a] / 2, n) for a, n in zip((u, v), counts)],

@@ -103,7 +103,6 @@ class _Knots(object):
             self._wait(move)
 
     def _angle_to(self, position):
-        """Angle between the heading and the direction to a position, -pi to pi."""
         x, y = position - self._value[:2]
         return wrapped(np.arctan2(y, x) - self._value[HEADING]) if x or y else 0.0
 
@@ -142,7 +141,6 @@ def wrapped(angle):
 
 
 def _following_motion(robot, person, duration_s):
-    """Motion of a robot that turns towards a person and approaches up to a distance."""
     follow, (x, y, heading) = robot.follow, robot.pose
     values, times_s = [], np.arange(0, duration_s + SMOOTHING_S, FOLLOW_STEP_S)
     for time_s in times_s:

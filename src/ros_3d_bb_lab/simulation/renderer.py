@@ -130,7 +130,6 @@ def _images(numbers, planes, limits):
 
 
 def _draw_shadows(color, surfaces, shadows, camera, world_from_camera):
-    """Draw soft shadows of people on the floor."""
     mask = np.zeros((camera.height // SHADOW_REDUCTION, camera.width // SHADOW_REDUCTION), np.float32)
     angles = np.linspace(0, 2 * np.pi, 16, endpoint=False)
     rotation, position = world_from_camera[:3, :3], world_from_camera[:3, 3]

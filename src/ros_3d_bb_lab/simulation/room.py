@@ -70,7 +70,6 @@ def _inverse_depth_of(surface, camera, world_from_camera):
 
 
 def _paint(color, mask, surface, line, camera, world_from_camera):
-    """Warp the texture of a surface into the pixels of a mask."""
     x, y, width, height = cv2.boundingRect(mask)
     if width == 0:
         return

@@ -201,7 +201,6 @@ class Simulator(object):
 
 
 def _largest_extent(mesh):
-    """Larger horizontal extent of a mesh, metres."""
     return float(np.ptp(mesh.vertices[:, :2], axis=0).max())
 
 

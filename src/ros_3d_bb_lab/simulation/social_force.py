@@ -59,5 +59,4 @@ def social_force(velocity, desired_velocity, offsets, velocities, border_offsets
 
 
 def _lengths(vectors):
-    """Lengths (n, 1), at least `NEAREST_M`."""
     return np.maximum(np.linalg.norm(vectors, axis=1), NEAREST_M)[:, None]

@@ -33,7 +33,6 @@ class DepthDetector(Detector):
         return detections
 
     def _known_floor(self, frame):
-        """The Floor that tf gives; None without one."""
         if frame.camera_from_floor is None or not frame.is_floor_known:
             return None
         raised = np.eye(4)

@@ -131,7 +131,6 @@ class DepthPeople(object):
         return grid
 
     def _last_at(self, position_m):
-        """The DepthDetection of the last people at a position; None without one."""
         return next((person for person in self._last_people
                      if _distance_m(person.position_m, position_m) < MIN_DISTANCE_M), None)
 
@@ -228,7 +227,6 @@ def _hides_legs(other, person):
 
 
 def _hidden_share(person, other):
-    """Share of the width of a person's box that is behind another, nearer person."""
     if other.position_m[1] >= person.position_m[1] - NEARER_M:
         return 0.0
     (x1, x2), (left, right) = person.box[::2], other.box[::2]
@@ -246,7 +244,6 @@ def _without_repeated(people):
 
 
 def _is_beside(person, others):
-    """Whether a DepthDetection may be of the same person as one of the others."""
     return any(_distance_m(person.position_m, other.position_m) < 2 * MIN_DISTANCE_M for other in others)
 
 

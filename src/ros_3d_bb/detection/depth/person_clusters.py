@@ -221,7 +221,6 @@ def is_standing(shape, params):
 
 
 def _connected(cells, row=0, column=0):
-    """Yield the connected blobs of a mask whose first cell is (row, column) of the grid."""
     count, labels, stats, _ = cv2.connectedComponentsWithStats(cells.astype(np.uint8), connectivity=4)
     for label in range(1, count):
         x, y, width, height, size = stats[label].tolist()

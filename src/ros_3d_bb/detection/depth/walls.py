@@ -115,7 +115,6 @@ def lines_of(view):
 
 
 def _tolerance(gradients, inverse):
-    """Largest deviation (k, n) of inverse depths (n,) from planes (k, 2)."""
     return NOISE + BUMP_M * np.hypot(gradients[:, :1], gradients[:, 1:2]) * inverse
 
 
@@ -138,7 +137,6 @@ def _columns_on(view, gradients):
 
 
 def _is_filled(on, behind):
-    """Which columns show a surface, and hardly anything behind it."""
     return (on > 0) & (behind <= SEEN_THROUGH * on)
 
 

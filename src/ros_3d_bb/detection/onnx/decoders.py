@@ -72,6 +72,5 @@ def _best(scores, confidence):
 
 
 def _corners(boxes):
-    """Convert boxes (n, 4) from center, width and height to corners."""
     center, half = boxes[:, :2], boxes[:, 2:] / 2
     return np.hstack((center - half, center + half))

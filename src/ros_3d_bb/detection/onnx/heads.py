@@ -63,7 +63,6 @@ def _matches(shape, cells):
 
 
 def _head_of(output, input_hw, grid, metadata):
-    """Name of the head with one output (1, n, m). Raises ValueError if it is unknown."""
     rows, columns = output.shape[1:]
     if columns >= 6 and (metadata.get('end2end') == 'True' or "'nms': True" in metadata.get('args', '')):
         return _checked_final(output[0])
@@ -91,7 +90,6 @@ def _checked_final(rows):
 
 
 def _class_count(head, shapes, metadata, names):
-    """Number of classes. Raises ValueError if it does not fit the names."""
     _one, rows, columns = shapes[0]
     if HEADS[head].suppressed:
         return len(names) or len(COCO)

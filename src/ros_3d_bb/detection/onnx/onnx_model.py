@@ -124,7 +124,6 @@ def _input_layout(shape):
 
 
 def _stride(metadata):
-    """Number of pixels of which height and width are multiples."""
     stride = str(metadata.get('stride', 32))
     if not (stride.isdigit() and 1 <= int(stride) <= MAX_STRIDE):
         raise ValueError('its stride is %.40r; 1 to %d expected' % (stride, MAX_STRIDE))

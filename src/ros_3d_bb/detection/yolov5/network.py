@@ -170,8 +170,6 @@ BLOCKS = {'Conv': Conv, 'C3': C3, 'SPP': SPP, 'SPPF': SPPF, 'Focus': Focus}
 
 
 class _Builder(object):
-    """Builds layers one by one. Stores the channels and the stride of each."""
-
     def __init__(self, layout):
         self._class_count = layout['nc']
         anchors = layout['anchors']

@@ -70,7 +70,6 @@ def _fields(*fields):
 
 
 def _varint(number):
-    """Encode an integer as a protobuf varint; negative numbers in 64 bits."""
     number &= 2 ** 64 - 1
     encoded = bytearray()
     while number > 127:

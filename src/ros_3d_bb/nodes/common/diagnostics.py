@@ -82,7 +82,6 @@ class Diagnostics(EventCounter):
         return isinstance(error, rospy.ROSException) and is_ending()
 
     def _report(self):
-        """Publish the status of the node."""
         is_recent = time.monotonic() - self._warned_at < WARNING_LASTS_S
         faults, totals = self._current_faults(), self.totals()
         if is_recent:

@@ -110,7 +110,6 @@ def _plain(value):
 
 
 def _slider(param):
-    """Return the minimum and maximum of a parameter; empty strings for text."""
     kind = type(param.default)
     if kind is bool:
         return False, True

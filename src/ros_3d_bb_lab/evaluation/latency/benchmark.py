@@ -71,7 +71,6 @@ def run(arguments):
 
 
 def _cases(arguments):
-    """The cases that the arguments select. Raises ValueError."""
     known = {case.name: case for case in cases_of([os.path.abspath(path) for path in arguments.weights])}
     names = arguments.cases.split(',') if arguments.cases else list(known)
     for name in names:

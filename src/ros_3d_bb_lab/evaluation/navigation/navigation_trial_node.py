@@ -111,7 +111,6 @@ class NavigationTrialNode(object):
             json.dump(result, stream)
 
     def _started(self):
-        """Wait until everything runs. Returns whether it does."""
         deadline_s, ready_ns = time.monotonic() + START_TIMEOUT_S, None
         wanted = {'costmap', *self._sources}
         while time.monotonic() < deadline_s and not rospy.is_shutdown():

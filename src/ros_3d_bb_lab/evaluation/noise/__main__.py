@@ -43,7 +43,6 @@ def _fit_recordings(arguments, folder):
 
 
 def _inputs(arguments):
-    """Read the measurements that the arguments name. Raises ValueError."""
     if arguments.session:
         estimator = arguments.estimator or 'foreground'
         z = x = x_variance = read_session_measurements(arguments.session, estimator)

@@ -167,7 +167,6 @@ def _dates_of(frames):
 
 
 def _estimate(frame, session, name):
-    """Position (3,) of the annotated person of a frame, or None."""
     if name == RECORDED:
         return frame.estimate_m
     box = frame.estimate(read_depth(frame, session), session.camera, estimator_named(name))

@@ -93,7 +93,6 @@ def _run_on_detections(arguments):
 
 
 def _run_at_rates(runs):
-    """Score our tracker on the pedestrians by image rate."""
     result = {}
     for every in PEDESTRIANS_EVERY:
         thinned = [run._replace(images=run.images[::every]) for run in runs]

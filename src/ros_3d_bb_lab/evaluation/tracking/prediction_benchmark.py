@@ -101,7 +101,6 @@ def tracked(tracker, times_s, points_m):
 
 
 def _predicted(track):
-    """Position (2,) and covariance (2, 2) of a TrackedObject after `HORIZON_S`."""
     step = int(round(HORIZON_S / track.prediction_step_s)) - 1
     return track.prediction_m[step, :2], track.prediction_covariance_m2[step, :2, :2]
 

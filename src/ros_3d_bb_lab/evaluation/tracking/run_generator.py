@@ -148,7 +148,6 @@ def _busiest(sequence, motion, seconds, camera, random):
 
 
 def _in_view(pedestrians, time_s, pose, camera):
-    """Number of people in the field of view, including occluded ones."""
     places_m = [person.position_m(time_s) for person in pedestrians if person.start_s <= time_s <= person.end_s]
     local_m = to_frame(pose, np.reshape(places_m, (-1, 2)))
     range_m = np.linalg.norm(local_m, axis=1)
@@ -157,7 +156,6 @@ def _in_view(pedestrians, time_s, pose, camera):
 
 
 def _walks(pedestrians, times_s):
-    """Sample the people that are present during the run. Returns _Walks."""
     there = [person for person in pedestrians
              if person.start_s <= times_s[-1] and person.end_s + STAYS_S >= times_s[0]]
     shape = (len(times_s), len(there))

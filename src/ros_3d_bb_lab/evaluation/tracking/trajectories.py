@@ -58,7 +58,6 @@ def read_sequence(path):
 
 
 def _sequence(source, name, rows):
-    """Sequence of rows (id, time_s, x_m, y_m)."""
     points = {}
     for identity, time_s, x_m, y_m in rows:
         if np.isfinite([time_s, x_m, y_m]).all():

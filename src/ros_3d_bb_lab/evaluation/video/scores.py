@@ -68,13 +68,11 @@ def compare(people, rects):
 
 
 def _common_areas(rect, rects):
-    """Areas (n,) that rectangles have in common with another one."""
     sides = np.minimum(rects[:, 2:], rect[2:]) - np.maximum(rects[:, :2], rect[:2])
     return np.clip(sides, 0, None).prod(axis=1)
 
 
 def _shares_on(rect, rects):
-    """Shares (n,) of rectangles that lie on another one."""
     return _common_areas(rect, rects) / np.maximum((rects[:, 2:] - rects[:, :2]).prod(axis=1), 1)
 
 

@@ -164,7 +164,6 @@ class SimulatorNode(object):
             time.sleep(STEP_S)
 
     def _play(self, start_ns):
-        """Play the scene once, with the first image at `start_ns`."""
         world = self._robot.restarted() if self._robot is not None else self._simulator
         began_s = time.monotonic()
         for time_s, number in self._simulator.steps():
