@@ -59,21 +59,6 @@ class Node(NamedTuple):
     sections: dict  # {section: [Entry]}
 
 
-class Parameter(NamedTuple):
-    name: str
-    kind: str
-    default: str  # as in YAML
-    text: str
-    facts: str  # see `Param.facts`
-    section: str
-
-
-class Launch(NamedTuple):
-    name: str
-    arguments: list  # [(name, doc)]
-    tree: ElementTree.Element
-
-
 def nodes():
     source = os.path.join(ROOT, 'src')
     paths = glob.glob(os.path.join(source, '**', '*_node.py'), recursive=True)
@@ -128,22 +113,20 @@ def _types_in(module, argument):
 
 
 def parameters_of(node, kinds=None):
-    """The parameters of a node, or of some of its types, by section; those that launch files set come last.
+    """Pairs (name, Param) of a node, or of some of its types, by section; those that launch files set come last.
 
     Raises ValueError if a parameter has no description.
     """
-    table, parameters = table_of(kinds or parameter_types(node.node_class)), []
-    for name, param in table.items():
-        launch_text = text_in_launch_file(node.name, name) if param.section == SET_BY_LAUNCH else None
-        if not (launch_text or param.text):
+    found = []
+    for name, param in table_of(kinds or parameter_types(node.node_class)).items():
+        if param.section == SET_BY_LAUNCH:
+            param = param._replace(text=text_in_launch_file(node.name, name) or param.text)
+        if not param.text:
             raise ValueError('%s: the parameter %s is described neither in its table nor by the doc= of a launch '
                              'argument' % (node.name, name))
-        text, facts = (launch_text, '') if launch_text else (param.text, param.facts)
-        kind = type(param.default).__name__.replace('tuple', 'list')
-        parameters.append(Parameter(name, kind, as_yaml(param.default), text, facts, param.section))
-    sections = [param.section for param in table.values()]
-    return sorted(parameters, key=lambda parameter: (parameter.section == SET_BY_LAUNCH,
-                                                     sections.index(parameter.section)))
+        found.append((name, param))
+    sections = [param.section for _name, param in found if param.section != SET_BY_LAUNCH] + [SET_BY_LAUNCH]
+    return sorted(found, key=lambda pair: sections.index(pair[1].section))
 
 
 def as_yaml(value):
@@ -162,16 +145,17 @@ def types_in_files(node):
 
 def config_file(node, kinds):
     """A file in config/ with the parameters of a node that launch files do not set, YAML."""
-    given = [parameter for parameter in parameters_of(node, kinds) if parameter.section != SET_BY_LAUNCH]
     lines = ['# Parameters of %s. %s' % (node.name, MADE_CONFIG), OWN_FILE, '']
     section = ''
-    for parameter in given:
-        if parameter.section != section:
-            section = parameter.section
+    for name, param in parameters_of(node, kinds):
+        if param.section == SET_BY_LAUNCH:
+            break
+        if param.section != section:
+            section = param.section
             lines += ['', '# --- ' + section]
-        text = '%s %s' % (parameter.text, parameter.facts)
+        text = '%s %s' % (param.text, param.facts)
         lines += ['# ' + line for line in textwrap.wrap(text, 118, break_on_hyphens=False)]
-        lines.append('%s: %s' % (parameter.name, parameter.default))
+        lines.append('%s: %s' % (name, as_yaml(param.default)))
     return '\n'.join(lines) + '\n'
 
 
@@ -184,37 +168,29 @@ def classes_file():
     return '\n'.join(lines) + '\n'
 
 
-def launch_files():
-    return [launch_of(path) for path in sorted(glob.glob(os.path.join(ROOT, 'launch', '*.launch')))]
-
-
-def launch_of(path):
-    tree = ElementTree.parse(path).getroot()
-    arguments = [(element.get('name'), _one_line(element.get('doc', '')).replace(OPTIONAL, ''))
-                 for element in tree.findall('arg') if element.get('value') is None]
-    return Launch(os.path.basename(path), arguments, tree)
-
-
 def starting(node_name):
-    return [(launch, element) for launch in launch_files() for element in launch.tree.iter('node')
+    """Name, content and <node> of the launch files that start a node."""
+    paths = sorted(glob.glob(os.path.join(ROOT, 'launch', '*.launch')))
+    return [(os.path.basename(path), tree, element) for path in paths for tree in [ElementTree.parse(path)]
+            for element in tree.iter('node')
             if (element.get('pkg'), element.get('type')) == ('ros_3d_bb', node_name)]
 
 
 def text_in_launch_file(node_name, parameter):
-    """The doc= of the launch argument that sets a parameter; None without one."""
-    for launch, element in starting(node_name):
-        groups = [group for group in launch.tree.iter('group') if group.get('ns') == node_name]
-        for given in itertools.chain(*(each.findall('param') for each in [element] + groups)):
-            argument = re.match(r'^\$\((?:arg|eval .* else) (\w+)\)$', given.get('value', ''))
-            if given.get('name') == parameter and argument:
-                text, = (doc for name, doc in launch.arguments if name == argument.group(1))
-                return '%s (`%s:=`)' % (text, argument.group(1))
-    return None
+    """The doc= of the launch argument that sets a parameter; empty without one."""
+    for _name, tree, element in starting(node_name):
+        for parent in [element] + tree.findall('.//group[@ns="%s"]' % node_name):
+            for given in parent.findall('param[@name="%s"]' % parameter):
+                argument = re.match(r'^\$\((?:arg|eval .* else) (\w+)\)$', given.get('value', ''))
+                if argument:
+                    text = _one_line(tree.find('arg[@name="%s"]' % argument.group(1)).get('doc'))
+                    return '%s (`%s:=`).' % (text.replace(OPTIONAL, ''), argument.group(1))
+    return ''
 
 
 def node_page(node):
     parts = ['# %s' % node.name, node.summary, node.text]
-    started = [_code(launch.name) for launch, _element in starting(node.name)]
+    started = [_code(name) for name, _tree, _element in starting(node.name)]
     parts.append('Started by %s. Names without a leading slash are relative to the namespace of the node; `~x` is '
                  '`%s/x`. Launch files can remap them.' % (', '.join(started), node.name))
     for section in SECTIONS:
@@ -224,22 +200,18 @@ def node_page(node):
             title = 'service' if section == 'Services' else 'topic'
             parts += ['## ' + section, _table((title, 'type', 'description'), rows)]
     parts.append('## Parameters')
-    for section, parameters in itertools.groupby(parameters_of(node), lambda parameter: parameter.section):
+    for section, parameters in itertools.groupby(parameters_of(node), lambda pair: pair[1].section):
         parts.append('### ' + section[0].upper() + section[1:] if section else '')
-        rows = [(_code('~' + parameter.name), parameter.kind, parameter.default,
-                 (parameter.text + ' ' + parameter.facts).strip()) for parameter in parameters]
+        rows = [(_code('~' + name), type(param.default).__name__.replace('tuple', 'list'), as_yaml(param.default),
+                 (param.text + ' ' + param.facts).strip()) for name, param in parameters]
         parts.append(_table(('parameter', 'type', 'default', 'description'), rows))
     return _page(parts)
 
 
-def nodes_page():
-    rows = [('[%s](%s.md)' % (node.name, node.name), node.summary) for node in nodes()]
-    return _page(['# Nodes', _table(('node', 'description'), rows)])
-
-
 def pages():
     made = {'doc/nodes/%s.md' % node.name: node_page(node) for node in nodes()}
-    return dict(made, **{'doc/nodes/index.md': nodes_page()})
+    rows = [('[%s](%s.md)' % (node.name, node.name), node.summary) for node in nodes()]
+    return dict(made, **{'doc/nodes/index.md': _page(['# Nodes', _table(('node', 'description'), rows)])})
 
 
 def config_files():
