@@ -81,13 +81,12 @@ def test_modes_differ_in_what_move_base_knows_of_people(mode):
     assert {'bbox3d_node', 'tracker_node'} & set(nodes) == ({'bbox3d_node', 'tracker_node'} if is_tracked else set())
     assert parameters['/simulator_node/boxes'] == is_tracked
     layers = [layer['name'] for layer in parameters['/move_base/local_costmap/plugins']]
-    assert layers == ['static_layer'] + {
-        mode: ['obstacle_layer', 'inflation_layer'] for mode in ('depth', 'laser', 'none')}.get(
-            mode, ['people_layer', 'prediction_layer'])
-    assert parameters['/move_base/DWAPlannerROS/sum_scores'] == (mode not in ('depth', 'laser', 'none'))
-    waits_for = [name for name in ('tracks', 'cloud', 'scan') if parameters['/navigation_trial_node/' + name]]
-    assert waits_for == {'depth': ['cloud'], 'laser': ['scan'], 'limited': ['tracks', 'scan'],
-                         'none': []}.get(mode, ['tracks'])
+    of_people = mode not in ('laser', 'none')
+    assert layers == ['static_layer'] + (
+        ['people_layer', 'prediction_layer'] if of_people else ['obstacle_layer', 'inflation_layer'])
+    assert parameters['/move_base/DWAPlannerROS/sum_scores'] == of_people
+    waits_for = [name for name in ('tracks', 'scan') if parameters['/navigation_trial_node/' + name]]
+    assert waits_for == {'laser': ['scan'], 'limited': ['tracks', 'scan'], 'none': []}.get(mode, ['tracks'])
     assert parameters.get('/speed_limit_node/use_scan') == (True if mode == 'limited' else None)
     assert parameters['/navigation_trial_node/visible'] == (mode == 'visible')
     assert parameters['/simulator_node/drive'] and parameters['/simulator_node/supervised']
