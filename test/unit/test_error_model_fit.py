@@ -50,7 +50,6 @@ def test_invalid_measurements_are_rejected(edit, reason):
         fit_error_model(*edit(*measure(SIMPLE, 1, noise=0.0)))
 
 
-@pytest.mark.slow
 def test_the_shipped_model_removes_the_bias_of_the_simulated_camera(tmp_path):
     """Mean errors away from the optical axis and in z at two ranges, where their standard errors are 0.017 and 0.01 m,
     and 0.004 and 0.006 m."""

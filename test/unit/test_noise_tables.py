@@ -62,16 +62,3 @@ def test_people_stand_upright_before_a_tilted_camera(tmp_path):
     change_json(str(tmp_path), lambda content: content['frames'][0].pop('up'))
     table = read_session_measurements(str(tmp_path), 'foreground')
     assert np.abs(table.measured_m[:, 2] - table.truth_m[:, 1]) > 0.1  # as if the camera were level
-
-
-@pytest.fixture(scope='module', params=['foreground', 'recorded'])
-def table(request, session_folder):
-    return read_session_measurements(session_folder, request.param)
-
-
-def made(count, seed=0, noise_m=0.01):
-    """Measured and true positions with the errors 0.1 - 0.05 z in z and -0.1 x in x."""
-    random = np.random.RandomState(seed)
-    truth_m = np.stack((random.uniform(-1, 1, count), random.uniform(1, 4, count)), axis=1)
-    error_m = np.stack((-0.1 * truth_m[:, 0], 0.1 - 0.05 * truth_m[:, 1]), axis=1)
-    return truth_m + error_m + noise_m * random.normal(size=truth_m.shape), truth_m

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from sensor_msgs.msg import Image
 
-from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.conversions.image_msgs import fill_image
 from ros_3d_bb.conversions.perception_msgs import time_from
@@ -22,12 +21,11 @@ from ros_3d_bb.nodes.common.graph_observer import GraphObserver
 from ros_3d_bb.nodes.doctor import bag_findings, graph_findings, machine_findings
 from ros_3d_bb.pipeline.transform_buffer import TransformBuffer
 from support.bags import changed_bag, scene_bag
+from support.broken_bags import DEPTH, DEPTH_INFO, INFO, in_the_frame_of_depth
 from support.masterless import masterless
 from support.ros import header_at
 
 SCENE = {'duration': 1.0, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}]}
-DEPTH, INFO = '/camera/aligned_depth_to_color/image_raw', '/camera/color/camera_info'
-DEPTH_INFO = '/camera/aligned_depth_to_color/camera_info'
 
 
 @pytest.fixture(scope='module')
@@ -109,14 +107,8 @@ RAW, RAW_INFO = '/front/depth/image_rect_raw', '/front/depth/camera_info'
 
 def raw_only(topic, message):
     """Depth in the frame of a depth camera, 5 cm beside colour, on topics of its own."""
-    if topic in (DEPTH, DEPTH_INFO):
-        message.header.frame_id = 'camera_depth_optical_frame'
-        return (RAW if topic == DEPTH else RAW_INFO), message
-    if topic == '/tf':
-        beside = transform_from((0.05, 0, 0), (0, 0, 0, 1))
-        message.transforms += transform_messages(message.transforms[0].header.stamp, [
-            ('camera_color_optical_frame', 'camera_depth_optical_frame', beside)])
-    return topic, message
+    topic, message, _time = in_the_frame_of_depth(topic, message, None)
+    return {DEPTH: RAW, DEPTH_INFO: RAW_INFO}.get(topic, topic), message
 
 
 def test_raw_depth_is_not_taken_for_aligned_depth(bag, tmp_path):

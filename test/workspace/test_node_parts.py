@@ -4,7 +4,6 @@ import socket
 from types import SimpleNamespace
 from unittest import mock
 
-import numpy as np
 import pytest
 import rospy
 import tf2_ros
@@ -14,6 +13,7 @@ from std_msgs.msg import Header
 from std_srvs.srv import SetBoolRequest
 from tf2_msgs.msg import TFMessage
 
+from ros_3d_bb.camera.camera_model import transform_from
 from ros_3d_bb.conversions.camera_msgs import transform_messages
 from ros_3d_bb.core.event_counter import EventCounter
 from ros_3d_bb.nodes.common import master, startup, subscribers
@@ -114,87 +114,67 @@ def test_a_detector_that_hangs_is_reported_unless_it_is_paused(rig, now_s):
 
 
 STAMP = rospy.Time(100)
-CAMERAS = 'front', 'rear'
-
-
-def test_the_transform_is_that_of_the_stamp():
-    """The robot drives on while an image waits for its boxes."""
-    with masterless() as connections:
-        transforms = Transforms(wait_s=0.0)
-        for number in range(2):
-            sent = link('map', 'base_link', STAMP + rospy.Duration(number))
-            sent.transform.translation.x = number
-            connections.send('/tf', TFMessage([sent]))
-        assert transforms.lookup('map', 'base_link', STAMP + rospy.Duration(0.5))[0, 3] == 0.5
 
 
 @pytest.fixture
-def transforms():
-    with masterless():
-        made = Transforms(wait_s=0.0)
-        made.set_transform(link('map', 'base_link'), 'test')
-        yield made
+def tf():
+    with masterless() as connections:
+        yield SimpleNamespace(connections=connections, transforms=Transforms(wait_s=0.0),
+                              send=lambda *links: connections.send('/tf', TFMessage(list(links))))
 
 
-def link(parent, child, stamp=STAMP):
-    message, = transform_messages(stamp, [(parent, child, np.eye(4))])
+def link(parent, child, stamp=STAMP, x_m=0.0):
+    message, = transform_messages(stamp, [(parent, child, transform_from((x_m, 0, 0), (0, 0, 0, 1)))])
     return message
 
 
-def why_not(transforms, camera):
-    with pytest.raises(tf2_ros.TransformException) as error:
-        transforms.lookup('map', camera, STAMP)
-    return str(error.value)
+def test_the_transform_is_that_of_the_stamp(tf):
+    """The robot drives on while an image waits for its boxes."""
+    for number in range(2):
+        tf.send(link('map', 'base_link', STAMP + rospy.Duration(number), number))
+    assert tf.transforms.lookup('map', 'base_link', STAMP + rospy.Duration(0.5))[0, 3] == 0.5
 
 
-def test_the_missing_frame_of_each_camera_is_named(transforms):
-    for camera in CAMERAS + CAMERAS:
-        assert 'tf has no frame %s;' % camera in why_not(transforms, camera)
+def test_the_missing_frame_of_each_camera_is_named(tf):
+    tf.send(link('map', 'base_link'))
+    for camera in 2 * ('front', 'rear'):
+        with pytest.raises(tf2_ros.TransformException, match='tf has no frame %s;' % camera):
+            tf.transforms.lookup('map', camera, STAMP)
 
 
-def test_a_transform_of_the_future_does_not_stop_the_latest_pose():
-    parents = {'odom': 'map', 'base_link': 'odom'}
-    with masterless() as connections:
-        transforms = Transforms(wait_s=0.0)
-        for number in range(30):
-            connections.now = stamp = STAMP + rospy.Duration(number * 0.1)
-            links = [link(parent, child, stamp) for child, parent in parents.items()]
-            links[1].transform.translation.x = number
-            if number == 10:
-                later = [link(parent, child, stamp + rospy.Duration(3600)) for child, parent in parents.items()]
-                connections.send('/tf', TFMessage(later))
-            connections.send('/tf', TFMessage(links))
-            if number < 10 or number >= 12:
-                assert transforms.latest('map', 'base_link', 0.5)[0][0, 3] == number
+def test_a_transform_of_the_future_does_not_stop_the_latest_pose(tf):
+    for number in range(30):
+        tf.connections.now = stamp = STAMP + rospy.Duration(number * 0.1)
+        if number == 10:
+            later = stamp + rospy.Duration(3600)
+            tf.send(link('map', 'odom', later), link('odom', 'base_link', later))
+        tf.send(link('map', 'odom', stamp), link('odom', 'base_link', stamp, number))
+        if number < 10 or number >= 12:
+            assert tf.transforms.latest('map', 'base_link', 0.5)[0][0, 3] == number
 
 
 @pytest.mark.parametrize('in_flight_s', [0.05, 5.9])
-def test_a_transform_from_before_a_jump_back_that_arrives_late_is_not_the_latest(in_flight_s):
+def test_a_transform_from_before_a_jump_back_that_arrives_late_is_not_the_latest(tf, in_flight_s):
     """As at each restart of a bag that is shorter than the cache of tf2, which would keep it until the next one."""
-    with masterless() as connections:
-        transforms, connections.now = Transforms(wait_s=0.0), STAMP + rospy.Duration(5.9)
-        connections.send('/tf', TFMessage([link('map', 'base_link', connections.now)]))
-        connections.now = STAMP
-        connections.send('/tf', TFMessage([link('map', 'base_link', STAMP + rospy.Duration(in_flight_s))]))
-        for number in range(30):
-            connections.now = stamp = STAMP + rospy.Duration(number * 0.1)
-            sent = link('map', 'base_link', stamp)
-            sent.transform.translation.x = number
-            connections.send('/tf', TFMessage([sent]))
-            if number:
-                assert transforms.latest('map', 'base_link', 0.5)[0][0, 3] == number
+    tf.connections.now = STAMP + rospy.Duration(5.9)
+    tf.send(link('map', 'base_link', tf.connections.now))
+    tf.connections.now = STAMP
+    tf.send(link('map', 'base_link', STAMP + rospy.Duration(in_flight_s)))
+    for number in range(30):
+        tf.connections.now = stamp = STAMP + rospy.Duration(number * 0.1)
+        tf.send(link('map', 'base_link', stamp, number))
+        if number:
+            assert tf.transforms.latest('map', 'base_link', 0.5)[0][0, 3] == number
 
 
 @pytest.mark.parametrize('back_s, is_kept', [(0.02, True), (0.9, True), (3.0, False)])
-def test_transforms_are_kept_when_time_goes_back_by_less_than_a_jump(back_s, is_kept):
+def test_transforms_are_kept_when_time_goes_back_by_less_than_a_jump(tf, back_s, is_kept):
     """As with each message of a second publisher of /clock, such as a bag that was recorded with all topics."""
-    with masterless() as connections:
-        transforms = Transforms(wait_s=0.0)
-        connections.now = STAMP
-        connections.send('/tf', TFMessage([link('map', 'front')]))
-        connections.now = STAMP - rospy.Duration(back_s)
-        connections.send('/tf', TFMessage([link('map', 'rear')]))
-        assert bool(transforms.can_transform_core('map', 'front', STAMP)[0]) is is_kept
+    tf.connections.now = STAMP
+    tf.send(link('map', 'front'))
+    tf.connections.now = STAMP - rospy.Duration(back_s)
+    tf.send(link('map', 'rear'))
+    assert bool(tf.transforms.can_transform_core('map', 'front', STAMP)[0]) is is_kept
 
 
 def test_a_master_that_hangs_is_queried_once_for_all_silent_inputs():
