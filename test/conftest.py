@@ -101,6 +101,14 @@ def reader(tmp_path_factory):
     return Reader(tmp_path_factory.mktemp('reader'))
 
 
+@pytest.fixture(scope='session')
+def recording(tmp_path_factory):
+    """The path of a recording of a RealSense."""
+    from support.realsense_recordings import FRAMES, SUFFIX, colored, sloping_depth, write_recording
+    path = str(tmp_path_factory.mktemp('recording') / ('a' + SUFFIX))
+    return write_recording(path, [colored(number) for number in range(FRAMES)], [sloping_depth()] * FRAMES)
+
+
 @pytest.fixture
 def camera_package(tmp_path):
     """A folder with a stand-in for the package realsense2_camera."""

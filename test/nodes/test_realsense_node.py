@@ -8,18 +8,11 @@ from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.conversions.camera_msgs import COLOR_TOPIC as COLOR, DEPTH_TOPIC as DEPTH, INFO_TOPICS
-from support.realsense_recordings import SKIPPED, START_MS, STEP_MS, SUFFIX, colored, sloping_depth, write_recording
+from support.realsense_recordings import FRAMES, SKIPPED, START_MS, STEP_MS
 from support.ros import Recorder, started
 
-FRAMES = 6
 IMAGE_TOPICS = dict({COLOR: Image, DEPTH: Image}, **{topic: CameraInfo for topic in INFO_TOPICS})
 TOPICS = dict({'/tf_static': TFMessage, '/clock': Clock}, **IMAGE_TOPICS)
-
-
-@pytest.fixture(scope='module')
-def recording(tmp_path_factory):
-    path = str(tmp_path_factory.mktemp('recording') / ('a' + SUFFIX))
-    return write_recording(path, [colored(number) for number in range(FRAMES)], [sloping_depth()] * FRAMES)
 
 
 @pytest.fixture(scope='module')

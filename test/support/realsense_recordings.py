@@ -14,6 +14,7 @@ DEPTH_FROM_COLOR = transform_from((0.0148, 0.0002, 0.0004), (0.002, -0.001, 0.00
 START_MS, STEP_MS = 1700000000000.25, 33.5
 # pyrealsense2 2.58 and later write .db3 and read both; old releases have no version attribute.
 SUFFIX = '.db3' if tuple(int(part) for part in getattr(rs, '__version__', '2.0').split('.')[:2]) >= (2, 58) else '.bag'
+FRAMES = 6  # of the fixture `recording`
 SKIPPED = 1  # first images that the library may not play, on a busy machine
 
 

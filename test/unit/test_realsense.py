@@ -9,16 +9,8 @@ from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, transform_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.drivers import realsense
 from ros_3d_bb.drivers.realsense import CameraLost, RealSense, RealSenseParams, camera_from_intrinsics, frame_links
-from support.realsense_recordings import (COLOR_CAMERA, DEPTH_FROM_COLOR, SKIPPED, START_MS, STEP_MS, SUFFIX, colored,
-                                          intrinsics_of, sloping_depth, write_recording)
-
-FRAMES = 4
-
-
-@pytest.fixture(scope='module')
-def recording(tmp_path_factory):
-    path = str(tmp_path_factory.mktemp('recording') / ('a' + SUFFIX))
-    return write_recording(path, [colored(number) for number in range(FRAMES)], [sloping_depth()] * FRAMES)
+from support.realsense_recordings import (COLOR_CAMERA, DEPTH_FROM_COLOR, FRAMES, SKIPPED, START_MS, STEP_MS, SUFFIX,
+                                          colored, intrinsics_of, sloping_depth, write_recording)
 
 
 def play(path, count, **params):

@@ -3,7 +3,6 @@ import json
 import os
 import re
 import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -23,6 +22,7 @@ from ros_3d_bb_lab.simulation.ros.scenario_to_bag import scenario_images, scenar
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
 from support.bags import changed_bag, messages_in, scene_bag, session_images
+from support.commands import run
 
 
 @pytest.fixture(scope='module')
@@ -54,21 +54,6 @@ def test_pixels_boxes_and_intrinsics_are_those_of_the_session(session, messages)
         assert boxes.stamp_ns == color.header.stamp.to_nsec()
         assert [tuple(box) for box in boxes.boxes.tolist()] == list(frame.boxes_px)
         assert camera_from_msg(messages['/camera/color/camera_info'][number]) == session.camera
-
-
-@pytest.fixture
-def run_tool(monkeypatch, capsys, tmp_path):
-    """Runs a command in the folder of the test; returns its exit status and output."""
-    def run(tool, *arguments):
-        monkeypatch.chdir(str(tmp_path))
-        monkeypatch.setattr(sys, 'argv', ['tool'] + [str(argument) for argument in arguments])
-        try:
-            tool()
-            status = 0
-        except SystemExit as error:
-            status = error.code
-        return status, ''.join(capsys.readouterr())
-    return run
 
 
 SCENE = {'duration': 0.5, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]}],
@@ -104,9 +89,9 @@ def test_a_scene_contains_the_images_of_the_simulator(scene):
 @pytest.mark.parametrize('text,option,named', [
     (json.dumps(SCENE), ('--rate', '0'), 'rate is 0'), (json.dumps(SCENE), ('--rate', 'nan'), 'rate is nan'),
     (json.dumps(SCENE), ('--seed', '-1'), 'seed is -1'), ('people:\n- {strat: [1, 2]}', (), 'mean start')])
-def test_an_invalid_scenario_leaves_no_bag_and_the_fault_is_named(tmp_path, run_tool, text, option, named):
+def test_an_invalid_scenario_leaves_no_bag_and_the_fault_is_named(tmp_path, text, option, named):
     (tmp_path / 'scene.yaml').write_text(text)
-    status, output = run_tool(scenario_to_bag, 'scene.yaml', 'out.bag', *option)
+    status, output = run(scenario_to_bag, tmp_path / 'scene.yaml', tmp_path / 'out.bag', *option)
     assert status == 1 and named in output and os.listdir(str(tmp_path)) == ['scene.yaml']
 
 

@@ -1,12 +1,8 @@
 """Advice is executed literally: after the doctor's `next:`, positions are as good as those of a sound bag, or the
 doctor names the fault and gives no `next:`. It finds no faults only if process_bag gives tracks.
 """
-import contextlib
-import io
 import os
 import shlex
-import sys
-from unittest import mock
 
 import numpy as np
 import pytest
@@ -18,6 +14,7 @@ from ros_3d_bb.nodes import doctor
 from ros_3d_bb.tracking.types import VISIBLE
 from support import broken_bags as broken
 from support.bags import changed_bag, messages_in, scene_bag
+from support.commands import run
 
 pytestmark = pytest.mark.slow
 PEOPLE = [{'start': [3.4, 0.9], 'moves': [{'to': [3.4, -0.9]}]},
@@ -41,14 +38,6 @@ def sound(tmp_path_factory):
     return bags
 
 
-def run(main, *arguments):
-    printed = io.StringIO()
-    with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed), \
-            mock.patch.object(sys, 'argv', ['command'] + list(arguments)), contextlib.suppress(SystemExit):
-        main()
-    return printed.getvalue()
-
-
 def execute(command, folder):
     """Run a command line of the doctor in a folder, without its report. Returns what it prints."""
     printed, before = '', os.getcwd()
@@ -60,7 +49,8 @@ def execute(command, folder):
                 with open(words[3], 'w') as stream:
                     stream.write(words[1])
             elif words[2] != 'scene_report':
-                printed = run({'doctor': doctor.main, 'process_bag': process_bag.main}[words[2]], *words[3:])
+                main = {'doctor': doctor.main, 'process_bag': process_bag.main}[words[2]]
+                _status, printed = run(main, *words[3:])
     finally:
         os.chdir(before)
     return printed

@@ -20,6 +20,7 @@ from ros_3d_bb.pipeline.detectors import DETECTORS, Row
 from ros_3d_bb.pipeline.people_pipeline import Settings
 from support.bags import changed_bag, messages_in, scene_bag
 from support.code_blocks import blocks_in
+from support.commands import run
 from support.compressed import compressed
 from support.masterless import masterless, published
 
@@ -87,10 +88,9 @@ def test_process_bag_writes_the_messages_that_the_nodes_publish(bags, node_class
 def test_a_detector_in_the_registry_runs_in_bags_and_nodes(bags, tmp_path, monkeypatch, row, params):
     monkeypatch.setitem(DETECTORS, 'middle', row)
     (tmp_path / 'params.yaml').write_text(json.dumps(params))
-    with pytest.raises(SystemExit) as ended:
-        main([bags[0], str(tmp_path / 'out.bag'), '--detector', 'middle', '--detector-params',
-              str(tmp_path / 'params.yaml')])
-    assert not ended.value.code
+    status, printed = run(main, bags[0], tmp_path / 'out.bag', '--detector', 'middle', '--detector-params',
+                          tmp_path / 'params.yaml')
+    assert not status, printed
     topics = [BOXES_TOPIC, BOXES3D_TOPIC, TRACKS_TOPIC]
     found = published(PeopleNode, bags[0], {'detector_node': dict(params, detector='middle')}, topics)
     expected = messages_in(tmp_path / 'out.bag')

@@ -1,6 +1,4 @@
-import contextlib
 import filecmp
-import io
 import os
 import signal
 import subprocess
@@ -20,6 +18,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.pipeline.people_pipeline import Settings
 from ros_3d_bb.sessions.session_reader import read_session
 from support.bags import changed_bag, messages_in, scene_bag, session_images
+from support.commands import run
 from support.ros import wait_until
 
 SCENE = {'duration': 1.5, 'rate': 10.0, 'people': [{'start': [3.0, 0.5], 'moves': [{'to': [3.0, -1.0]}]},
@@ -41,11 +40,9 @@ def session_bag(session_folder, tmp_path):
 
 
 def run_tool(*arguments):
-    printed = io.StringIO()
-    with contextlib.redirect_stdout(printed), pytest.raises(SystemExit) as ended:
-        main([str(argument) for argument in arguments])
-    assert not ended.value.code, printed.getvalue()
-    return printed.getvalue()
+    status, printed = run(main, *arguments)
+    assert not status, printed
+    return printed
 
 
 def test_people_are_tracked_and_the_input_is_kept(scene, tmp_path):
@@ -133,13 +130,12 @@ def test_transforms_of_old_bags_are_used(scene, tmp_path):
     assert not {'no transform', 'transforms rejected'} & set(events.counts) and events.counts['images with tracks']
 
 
-def test_an_output_that_cannot_be_written_is_named_before_the_work(scene, tmp_path, capsys, monkeypatch):
+def test_an_output_that_cannot_be_written_is_named_before_the_work(scene, tmp_path, monkeypatch):
     monkeypatch.setattr('ros_3d_bb.bags.bag_pipeline.BagRun.outputs', lambda _run: pytest.fail('it began'))
     (tmp_path / 'folder').mkdir()
     for target in (tmp_path / 'folder', tmp_path / 'missing' / 'out.bag'):
-        with pytest.raises(SystemExit) as error:
-            main([scene, str(target), '--detector', 'depth'])
-        assert error.value.code == 1 and str(target) in capsys.readouterr().err
+        status, printed = run(main, scene, target, '--detector', 'depth')
+        assert status == 1 and str(target) in printed
     assert os.listdir(str(tmp_path)) == ['folder']
 
 
@@ -153,7 +149,7 @@ def test_a_signal_leaves_no_incomplete_bag(scene, tmp_path, number):
     assert command.wait(60) == 128 + number and os.listdir(str(tmp_path)) == []
 
 
-def test_broken_bags_are_named(scene, tmp_path, capsys):
+def test_broken_bags_are_named(scene, tmp_path):
     with open(scene, 'rb') as stream:
         content = stream.read()
     middle = len(content) // 2
@@ -162,9 +158,8 @@ def test_broken_bags_are_named(scene, tmp_path, capsys):
     for name, changed in contents.items():
         (tmp_path / name).write_bytes(changed)
     for name in list(contents) + ['missing.bag']:
-        with pytest.raises(SystemExit) as error:
-            main([str(tmp_path / name), str(tmp_path / 'out.bag'), '--detector', 'depth'])
-        assert error.value.code == 1 and str(tmp_path / name) in capsys.readouterr().err
+        status, printed = run(main, tmp_path / name, tmp_path / 'out.bag', '--detector', 'depth')
+        assert status == 1 and str(tmp_path / name) in printed
     assert sorted(os.listdir(str(tmp_path))) == sorted(contents)
 
 
@@ -175,21 +170,18 @@ def test_broken_bags_are_named(scene, tmp_path, capsys):
     ('a.bag b.bag --detector depth --remap camera/colour/image_raw:=x', 'did you mean camera/color/image_raw?'),
     ('a.bag b.bag --detector depth --cameras left,right --remap camera/color/image_raw:=x', 'the nodes have no topic'),
     ('a.bag b.bag --detector depth --depth raw --remap camera/aligned_depth_to_color/image_raw:=x', '--remap')])
-def test_invalid_arguments_are_rejected(tmp_path, monkeypatch, capsys, arguments, complaint):
+def test_invalid_arguments_are_rejected(tmp_path, monkeypatch, arguments, complaint):
     monkeypatch.chdir(str(tmp_path))
-    with pytest.raises(SystemExit) as error:
-        main(arguments.split())
-    assert error.value.code == 2 and complaint in capsys.readouterr().err and os.listdir(str(tmp_path)) == []
+    status, printed = run(main, *arguments.split())
+    assert status == 2 and complaint in printed and os.listdir(str(tmp_path)) == []
 
 
 @pytest.mark.parametrize('text,complaint', [('target_frme: odom', 'did you mean ~target_frame'),
                                             ('- 1', 'names and values')])
-def test_parameter_files_are_checked(tmp_path, capsys, text, complaint):
+def test_parameter_files_are_checked(tmp_path, text, complaint):
     (tmp_path / 'tracker.yaml').write_text(text + '\n')
-    with pytest.raises(SystemExit) as error:
-        main(['a.bag', 'b.bag', '--detector', 'depth', '--tracker-params', str(tmp_path / 'tracker.yaml')])
-    printed = capsys.readouterr().err
-    assert error.value.code == 2 and complaint in printed and 'error: --tracker-params: ' in printed
+    status, printed = run(main, 'a.bag', 'b.bag', '--detector', 'depth', '--tracker-params', tmp_path / 'tracker.yaml')
+    assert status == 2 and complaint in printed and 'error: --tracker-params: ' in printed
 
 
 def test_parameter_files_of_the_nodes_are_used(scene, tmp_path):
