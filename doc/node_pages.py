@@ -145,14 +145,14 @@ def types_in_files(node):
 
 def config_file(node, kinds):
     """A file in config/ with the parameters of a node that launch files do not set, YAML."""
-    lines = ['# Parameters of %s. %s' % (node.name, MADE_CONFIG), OWN_FILE, '']
-    section = ''
+    lines = ['# Parameters of %s. %s' % (node.name, MADE_CONFIG), OWN_FILE]
+    section = None
     for name, param in parameters_of(node, kinds):
         if param.section == SET_BY_LAUNCH:
             break
         if param.section != section:
             section = param.section
-            lines += ['', '# --- ' + section]
+            lines += ['', '# --- ' + section] if section else ['']
         text = '%s %s' % (param.text, param.facts)
         lines += ['# ' + line for line in textwrap.wrap(text, 118, break_on_hyphens=False)]
         lines.append('%s: %s' % (name, as_yaml(param.default)))

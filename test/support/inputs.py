@@ -6,7 +6,6 @@ from unittest import mock
 import numpy as np
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 from sensor_msgs.msg import LaserScan
-from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
@@ -27,7 +26,7 @@ from ros_3d_bb.nodes.speed_limit_node import SpeedLimitNode
 from ros_3d_bb.nodes.tracker_node import TrackerNode
 from ros_3d_bb.nodes.viewer_node import ViewerNode
 from support.masterless import on_the_wire
-from support.ros import person
+from support.ros import header_at, person
 
 CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
 
@@ -71,7 +70,7 @@ def good_messages(stamp_ns):
     """Messages {topic: message} of a valid image of a person at 2 m, its boxes and tracks, in the order of sending."""
     depth_mm = np.full((CAMERA.height, CAMERA.width), 4000, np.uint16)
     depth_mm[8:44, 26:38] = 2000
-    header = Header(stamp=time_from(stamp_ns), frame_id='camera')
+    header = header_at(stamp_ns, 'camera')
     messages = dict(messages_of(CameraFrame(copy.copy(header), CAMERA, np.full(depth_mm.shape + (3,), 90, np.uint8),
                                             DepthImage(depth_mm, 0.001), [])))
     messages[BOXES_TOPIC] = boxes2d_to_msg(np.array([[26, 8, 38, 44]]), header)

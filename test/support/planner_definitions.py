@@ -5,10 +5,10 @@ rst-tu-dortmund/costmap_converter, astuff/astuff_sensor_msgs (derived_object_msg
 and 0.0.2, the releases for ROS 1) and ros/common_msgs (shape_msgs). `PUBLISHED_MD5` are checksums from published code.
 """
 import functools
-import importlib
 import types
 
 import genpy.dynamic
+from roslib.message import get_message_class
 
 DEFINITIONS = {
     'people_msgs/Person': """
@@ -89,19 +89,14 @@ PUBLISHED_MD5 = {'people_msgs/People': '18722f4b8db20cc2369740732357847b',
 SEPARATOR = '\n' + '=' * 80 + '\n'
 
 
-def _installed(kind):
-    package_name, name = kind.split('/')
-    return getattr(importlib.import_module(package_name + '.msg'), name)
-
-
 def _own_text(kind):
-    return DEFINITIONS[kind] if kind in DEFINITIONS else _installed(kind)._full_text.split(SEPARATOR)[0]
+    return DEFINITIONS[kind] if kind in DEFINITIONS else get_message_class(kind)._full_text.split(SEPARATOR)[0]
 
 
 def _fields(kind):
     if kind in DEFINITIONS:
         return [line.split()[0] for line in DEFINITIONS[kind].strip().splitlines()]
-    return _installed(kind)._slot_types
+    return get_message_class(kind)._slot_types
 
 
 def _kinds_in(kind):

@@ -5,7 +5,6 @@ from unittest import mock
 import numpy as np
 import pytest
 import rospy
-from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from ros_3d_bb.camera.camera_model import transform_from
@@ -16,7 +15,7 @@ from ros_3d_bb.msg import TrackedObjectArray
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeNode
 from support.masterless import masterless
 from support.planner_definitions import package
-from support.ros import person
+from support.ros import header_at, person
 
 START_NS = 1000 * NS
 PACKAGES = 'people_msgs', 'costmap_converter', 'derived_object_msgs', 'vision_msgs'
@@ -56,7 +55,7 @@ class Bridge(object):
         self._connections.send('/tf', TFMessage(transform_messages(time_from(stamp_ns), [('map', child, pose)])))
 
     def send(self, stamp_ns, *tracks, frame_id='map'):
-        header = Header(stamp=time_from(stamp_ns), frame_id=frame_id)
+        header = header_at(stamp_ns, frame_id)
         self._connections.send(TRACKS_TOPIC, TrackedObjectArray(header=header, objects=list(tracks)))
 
     def count(self, topic):

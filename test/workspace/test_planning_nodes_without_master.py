@@ -18,7 +18,7 @@ from ros_3d_bb.nodes.people_removal_node import PeopleRemovalNode
 from ros_3d_bb.nodes.speed_limit_node import SpeedLimitNode
 from support.inputs import transforms
 from support.masterless import masterless, on_the_wire
-from support.ros import person
+from support.ros import header_at, person
 from support.tracks import track_at
 
 STAMP_NS = 1000 * NS
@@ -30,7 +30,7 @@ def node_with(inputs, *people, age_ns=NS // 10, **params):
         node = PeopleRemovalNode()
         connections.now = time_from(STAMP_NS)
         connections.send('/tf', transforms(STAMP_NS))
-        header = Header(stamp=time_from(STAMP_NS - age_ns), frame_id='map')
+        header = header_at(STAMP_NS - age_ns, 'map')
         connections.send(TRACKS_TOPIC, TrackedObjectArray(header=header, objects=list(people)))
         connections.counts = node._diagnostics.counts
         yield connections
@@ -43,7 +43,7 @@ def sent(connections, name, message):
 
 def scan(frame_id='base_link'):
     """Three beams: right, ahead and left, of which the middle one ends at 2 m."""
-    return LaserScan(header=Header(stamp=time_from(STAMP_NS), frame_id=frame_id), angle_min=-0.5, angle_increment=0.5,
+    return LaserScan(header=header_at(STAMP_NS, frame_id), angle_min=-0.5, angle_increment=0.5,
                      range_max=30.0, ranges=[3.0, 2.0, 3.0])
 
 
@@ -78,7 +78,7 @@ def seen_while_turning(person_m, walks_mps=0.0):
 def test_beams_are_removed_at_the_pose_of_each_beam(bearing_deg, walks_mps):
     person_m = 4.0 * np.cos(np.radians(bearing_deg)), 4.0 * np.sin(np.radians(bearing_deg))
     ranges_m = seen_while_turning(person_m, walks_mps)
-    message = LaserScan(header=Header(stamp=time_from(STAMP_NS), frame_id='base_link'), angle_min=-np.pi,
+    message = LaserScan(header=header_at(STAMP_NS, 'base_link'), angle_min=-np.pi,
                         angle_increment=2 * np.pi / 720, time_increment=PERIOD_S / 720, ranges=ranges_m.tolist())
     with node_with('scan', person(1, *person_m, speed=walks_mps), age_ns=0) as connections:
         one_pose = sent(connections, 'scan', message).ranges
@@ -103,7 +103,7 @@ def test_measurements_pass_where_it_is_unknown_where_people_are(frame_id, age_ns
 @pytest.mark.parametrize('height', [1, 2])
 def test_points_of_people_are_dropped_or_nan_in_an_organised_cloud(height):
     points = np.array([[2.0, 0.1, 0.5], [4.0, 0.1, 0.5], [2.0, 2.0, 0.5], [2.0, 0.0, 1.0]])
-    cloud = points_to_msg(points, Header(stamp=time_from(STAMP_NS), frame_id='base_link'))
+    cloud = points_to_msg(points, header_at(STAMP_NS, 'base_link'))
     cloud.height, cloud.width = height, 4 // height
     cloud.row_step = cloud.width * cloud.point_step
     with node_with('points', walking(2.0, 0.1)) as connections:
@@ -118,7 +118,7 @@ def test_points_of_people_are_dropped_or_nan_in_an_organised_cloud(height):
 
 def test_a_cloud_of_another_layout_passes_as_it_is_also_where_people_are():
     """With gaps between the rows. A costmap that received it only without people would be blind beside them."""
-    cloud = points_to_msg(np.array([[2.0, 0.1, 0.5]]), Header(stamp=time_from(STAMP_NS), frame_id='base_link'))
+    cloud = points_to_msg(np.array([[2.0, 0.1, 0.5]]), header_at(STAMP_NS, 'base_link'))
     cloud.row_step, cloud.data = 16, cloud.data + bytes(4)
     with node_with('points', walking(2.0, 0.1)) as connections:
         assert sent(connections, 'points', cloud) == cloud and connections.counts['points with people'] == 1
@@ -150,7 +150,7 @@ class Robot(object):
     def forwarded(self, now_ns, *tracks, frame_id='map'):
         """Speed of the command that is forwarded for one of 1 m/s ahead."""
         self._connections.now = time_from(now_ns)
-        header = Header(stamp=time_from(now_ns), frame_id=frame_id)
+        header = header_at(now_ns, frame_id)
         self._connections.send(TRACKS_TOPIC, tracks_to_msg(tracks, header))
         self._connections.send('cmd_vel_in', velocity_to_msg(1.0, 0.0, 0.0))
         return self._connections.publishers['cmd_vel'].newest.linear.x
