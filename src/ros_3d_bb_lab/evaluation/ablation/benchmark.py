@@ -160,7 +160,7 @@ def kitti(_arguments):
 
 
 def _track_scores(runs):
-    scores = scores_of([score_run(run, outputs_of(Tracker, run)) for run in runs])
+    scores = scores_of([score_run(run, outputs_of(Tracker(), run)) for run in runs])
     return {key: scores[key] for key in ('hota', 'idf1', 'id_switches', 'fde_2s_m')}
 
 

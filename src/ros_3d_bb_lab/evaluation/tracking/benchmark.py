@@ -2,8 +2,6 @@
 
 Detection errors are as measured in the thesis. Without recordings, pedestrian trajectories are generated.
 """
-from typing import Any, NamedTuple
-
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
@@ -22,35 +20,23 @@ RATE_SCORES = 'hota', 'idf1', 'id_switches'
 PEDESTRIANS_EVERY = 1, 2, 3, 6, 10  # 30, 15, 10, 5 and 3 Hz
 
 
-class Contestant(NamedTuple):
-    """Tracker to be compared: `make` creates it, and `outputs(make, run)` returns what it publishes on a run."""
-
-    name: str
-    make: Any
-    outputs: Any
-
-
-def outputs_of(make_tracker, run):
-    tracker = make_tracker()
+def outputs_of(tracker, run):
     return [tracker.update(image.stamp_ns, image.detections, image.view) for image in run.images]
 
 
-CONTESTANTS = (Contestant('ours', Tracker, outputs_of),
-               Contestant('thesis', OriginalTracker, lambda make, run: outputs_of(make, as_it_arrived(run))),
-               Contestant('library', Norfair, outputs_of))
-
-
-def _norfair_outputs(make_tracker, run):
+def _norfair_outputs(run):
     """As `outputs_of`, for Norfair at the rate of the run, without the boxes below the score tuned for it."""
     period_s = np.median(np.diff([image.stamp_ns for image in run.images])) / NS
     images = [image._replace(detections=[detection for detection in image.detections
                                          if detection.score >= LIDAR_SCORE]) for image in run.images]
-    return outputs_of(lambda: make_tracker(LIDAR._replace(rate_hz=1 / period_s)),
-                      run._replace(images=tuple(images)))
+    return outputs_of(Norfair(LIDAR._replace(rate_hz=1 / period_s)), run._replace(images=tuple(images)))
 
 
-CONTESTANTS_ON_DETECTIONS = (Contestant('ours', Tracker, outputs_of),
-                             Contestant('library', Norfair, _norfair_outputs))
+# Functions that return what a new tracker publishes on a run.
+OURS = {'ours': lambda run: outputs_of(Tracker(), run)}
+CONTESTANTS = dict(OURS, thesis=lambda run: outputs_of(OriginalTracker(), as_it_arrived(run)),
+                   library=lambda run: outputs_of(Norfair(), run))
+CONTESTANTS_ON_DETECTIONS = dict(OURS, library=_norfair_outputs)
 
 
 def compare(runs, contestants):
@@ -58,10 +44,10 @@ def compare(runs, contestants):
 
     Raises ValueError if an optional library is not installed.
     """
-    scores = {contestant.name: [] for contestant in contestants}
+    scores = {name: [] for name in contestants}
     for run in runs:
-        for contestant in contestants:
-            scores[contestant.name].append(score_run(run, contestant.outputs(contestant.make, run)))
+        for name, outputs in contestants.items():
+            scores[name].append(score_run(run, outputs(run)))
         print(line_of('%s, %d images, HOTA:' % (run.name, len(run.images)), **{
             name: scores_of(run_scores[-1:])['hota'] for name, run_scores in scores.items()}), flush=True)
     return {name: scores_of(run_scores) for name, run_scores in scores.items()}
@@ -98,7 +84,7 @@ def _run_at_rates(runs):
         thinned = [run._replace(images=run.images[::every]) for run in runs]
         gaps_ns = np.concatenate([np.diff([image.stamp_ns for image in run.images]) for run in thinned])
         rate_hz = '%.1f' % (NS / np.median(gaps_ns))
-        scores = compare(thinned, CONTESTANTS[:1])['ours']
+        scores = compare(thinned, OURS)['ours']
         result[rate_hz] = {key: scores[key] for key in RATE_SCORES}
         print(line_of(rate_hz + ' Hz', **result[rate_hz]), flush=True)
     return result

@@ -35,10 +35,7 @@ def score_run(run, outputs):
         tracks.append(track_ids)
         similarities.append(similarity)
         errors += image_errors
-    data = trackeval_data(people, tracks, similarities)
-    with contextlib.redirect_stdout(io.StringIO()):
-        results = [metric.eval_sequence(data) for metric in trackeval_metrics()]
-    return results, np.reshape(errors, (-1, 2 + len(HORIZONS_S), 3))
+    return trackeval_results(people, tracks, similarities), np.reshape(errors, (-1, 2 + len(HORIZONS_S), 3))
 
 
 def scores_of(run_scores):
@@ -126,8 +123,8 @@ def trackeval_metrics():
     return HOTA(), CLEAR(threshold), Identity(threshold)
 
 
-def trackeval_data(people, tracks, similarities):
-    """Input of TrackEval's metrics, with consecutive IDs from 0: person and track IDs, and similarities of each image.
+def trackeval_results(people, tracks, similarities):
+    """Results of `trackeval_metrics`, given person and track IDs, and similarities of each image.
 
     Raises ValueError if there are no images.
     """
@@ -135,8 +132,9 @@ def trackeval_data(people, tracks, similarities):
         raise ValueError('a run has no images; a longer run is required')
     data = {'similarity_scores': similarities, 'num_timesteps': len(similarities)}
     for name, ids in (('gt', people), ('tracker', tracks)):
-        known = np.unique(np.concatenate(ids))
+        known = np.unique(np.concatenate(ids))  # consecutive IDs from 0 are required
         data['%s_ids' % name] = [np.searchsorted(known, image_ids) for image_ids in ids]
         data['num_%s_ids' % name] = len(known)
         data['num_%s_dets' % name] = sum(len(image_ids) for image_ids in ids)
-    return data
+    with contextlib.redirect_stdout(io.StringIO()):
+        return [metric.eval_sequence(data) for metric in trackeval_metrics()]

@@ -6,8 +6,6 @@ a person that is not scored. Tracks with the status VISIBLE have the box of thei
 people in the same way. One of them is false only if it is not on a person at all: if its box contains less than half of
 the visible part of each person. A box that is too large, or of a part of a person, is an error of the box.
 """
-import contextlib
-import io
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +14,7 @@ from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.detection.boxes import iou
 from ros_3d_bb.tracking.association import assign
 from ros_3d_bb.tracking.types import VISIBLE
-from ros_3d_bb_lab.evaluation.tracking.metrics import trackeval_data, trackeval_metrics
+from ros_3d_bb_lab.evaluation.tracking.metrics import trackeval_results
 
 FOUND_IOU, LEAST_VISIBLE, ON_UNSCORED, ON_PERSON = 0.5, 0.5, 0.5, 0.5
 NEAREST_M = 0.1  # nearer points are not projected
@@ -113,9 +111,7 @@ def score_tracks(steps, truth, tracker, view):
 
 
 def _identity_scores(people_ids, track_ids, overlaps):
-    data = trackeval_data(people_ids, track_ids, overlaps)
-    with contextlib.redirect_stdout(io.StringIO()):
-        hota, clear, identity = [metric.eval_sequence(data) for metric in trackeval_metrics()]
+    hota, clear, identity = trackeval_results(people_ids, track_ids, overlaps)
     return {'idf1': 100 * float(identity['IDF1']), 'hota': 100 * float(np.mean(hota['HOTA'])),
             'id_switches': int(clear['IDSW'])}
 
