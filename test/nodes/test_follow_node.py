@@ -3,7 +3,6 @@
 People are detected in the rendered images, without weights. ROS_3D_BB_FOLLOW_S is the time of the scene.
 """
 import os
-import signal
 import threading
 import time
 
@@ -15,8 +14,8 @@ from std_msgs.msg import UInt32
 from std_srvs.srv import SetBool
 
 from ros_3d_bb.msg import TrackedObjectArray
-from ros_3d_bb_lab.evaluation.latency.latency_probe_node import pid_of
 from ros_3d_bb_lab.evaluation.tracking.metrics import MATCHED_M
+from support.processes import hanging
 from support.ros import Recorder, launched, wait_until
 
 FOLLOWED_S = float(os.environ.get('ROS_3D_BB_FOLLOW_S', 15))
@@ -85,17 +84,13 @@ def test_the_robot_follows_the_same_person_past_others(witness):
 def test_the_robot_stops_when_the_tracks_stop_and_the_node_is_silent(witness):
     rospy.ServiceProxy('follow_node/enable', SetBool)(True)
     wait_until(lambda: speed(witness) > 0.1, 'motion', STARTING_S)
-    pid = pid_of('people_node')
-    os.kill(pid, signal.SIGSTOP)
-    try:
+    with hanging('people_node'):
         stopped_s = rospy.get_time()
         wait_until(lambda: speed(witness) == 0.0, 'zero velocity')
         assert rospy.get_time() - stopped_s < STOP_S
         messages = witness.velocities.messages  # slow down to zero first, while the tracks are not too old yet
         wait_until(lambda: witness.velocities.stays_at(len(messages), 1.0), 'silence')
         assert speed(witness) == 0.0
-    finally:
-        os.kill(pid, signal.SIGCONT)
     rospy.ServiceProxy('follow_node/enable', SetBool)(True)  # the person may be lost
     wait_until(lambda: speed(witness) > 0.1, 'motion with new tracks', STARTING_S)
 

@@ -24,7 +24,7 @@ from ros_3d_bb_lab.simulation.driven_world import moved
 from ros_3d_bb_lab.simulation.simulator import upright
 from support.planner_definitions import message_class
 from support.real_planners import ROOT, planner_environment
-from support.ros import Recorder, header_at, wait_until
+from support.ros import Recorder, happens, header_at, wait_until
 from support.two_cameras import boxes
 
 TICK_NS, PERIOD_NS = NS // 100, NS // 10
@@ -93,8 +93,8 @@ class DrivenRobot(object):
         for _step in range(int(round(10 * seconds))):
             self._send_tf()  # first: the tracker needs it for the boxes before
             if self.costmap.messages:
-                self._wait_for(lambda: (self.commands > self._commands or not is_driven)
-                               and self.now_ns - _newest_ns(self.costmap) < COSTMAP_NS)
+                happens(lambda: (self.commands > self._commands or not is_driven)
+                        and self.now_ns - _newest_ns(self.costmap) < COSTMAP_NS, PATIENCE_S)
             self._commands = self.commands
             for tick in range(PERIOD_NS // TICK_NS):
                 self.now_ns += TICK_NS
@@ -119,7 +119,7 @@ class DrivenRobot(object):
     def _send_boxes(self):
         """The boxes of the people in front of the camera, once the bridge has answered the last ones."""
         if self._sent_ns and self._answered and not self.is_faulty:
-            self._answered = self._wait_for(lambda: _newest_ns(self.ring) >= self._sent_ns)
+            self._answered = happens(lambda: _newest_ns(self.ring) >= self._sent_ns, PATIENCE_S)
         self._answered |= bool(self._sent_ns) and _newest_ns(self.ring) >= self._sent_ns
         map_from_camera = np.linalg.inv(self.odom_from_map(self.seconds)).dot(level(*self._pose)).dot(BASE_FROM_CAMERA)
         people_m = np.asarray(self.people(self.seconds)).reshape(-1, 2)
@@ -127,13 +127,6 @@ class DrivenRobot(object):
         self._boxes_pub.publish(boxes(self.now_ns, CAMERA, [tuple(center_m) for center_m in centers_m
                                                             if center_m[2] > 0.5]))
         self._sent_ns = self.now_ns
-
-    @staticmethod
-    def _wait_for(condition):
-        deadline_s = time.monotonic() + PATIENCE_S
-        while not condition() and time.monotonic() < deadline_s:
-            time.sleep(0.002)
-        return condition()
 
 
 def _newest_ns(recorder):

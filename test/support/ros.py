@@ -15,12 +15,18 @@ from support.tracks import track_at
 TIMEOUT_S = 60.0  # to start the pipeline on a busy machine
 
 
-def wait_until(condition, what, timeout_s=TIMEOUT_S):
-    """Wait in wall-clock time, independent of /clock, and fail after the timeout."""
+def happens(condition, timeout_s):
+    """Whether a condition becomes true within a timeout in wall-clock time, independent of /clock."""
     deadline_s = time.monotonic() + timeout_s
     while not condition():
-        assert time.monotonic() < deadline_s and not rospy.is_shutdown(), 'never happened: %s' % what
-        time.sleep(0.01)
+        if time.monotonic() > deadline_s or rospy.is_shutdown():
+            return False
+        time.sleep(0.002)
+    return True
+
+
+def wait_until(condition, what, timeout_s=TIMEOUT_S):
+    assert happens(condition, timeout_s), 'never happened: %s' % what
 
 
 def launched(*arguments):

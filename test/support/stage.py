@@ -17,7 +17,7 @@ from ros_3d_bb.msg import TrackedObject, TrackedObjectArray
 from ros_3d_bb_lab.simulation.ros.scenario_to_bag import simulated_messages
 from ros_3d_bb_lab.simulation.scenario import scenario_from
 from ros_3d_bb_lab.simulation.simulator import Simulator
-from support.ros import TIMEOUT_S, Recorder, publisher
+from support.ros import TIMEOUT_S, Recorder, happens, publisher
 
 TOPICS = INFO_TOPICS[0], DEPTH_TOPIC, COLOR_TOPIC, TF_TOPIC
 PERIOD_NS = NS // 10
@@ -78,7 +78,7 @@ class Stage(object):
     def tries(self, timeout_s):
         """Send the next image, which a node may miss. Returns whether its tracks arrive."""
         stamp = time_from(self.send())
-        return _within(timeout_s, lambda: self.tracks.messages and self.tracks.messages[-1].header.stamp == stamp)
+        return happens(lambda: self.tracks.messages and self.tracks.messages[-1].header.stamp == stamp, timeout_s)
 
     def recovered(self, fault, limit=RECOVERY_IMAGES):
         """Send images until all people are tracked and sent to planners, and measure how many it takes.
@@ -107,8 +107,9 @@ class Stage(object):
         tracks, stamp = self.tracks.messages[-1].objects, time_from(self.now_ns)
         return (all(track.status == TrackedObject.VISIBLE for track in tracks)
                 and sorted(_name_of(track, people) or '' for track in tracks) == sorted(people)
-                and _within(_timeout_s(self.points.messages, sent), lambda: any(
-                    message.header.stamp == stamp and message.width for message in self.points.messages[-5:])))
+                and happens(lambda: any(message.header.stamp == stamp and message.width
+                                        for message in self.points.messages[-5:]),
+                            _timeout_s(self.points.messages, sent)))
 
     def check(self):
         """Check new tracks: stamps are those of images, in order; each track is a person, and keeps to that person."""
@@ -138,15 +139,6 @@ class Stage(object):
 def _timeout_s(messages, sent):
     """How long to wait for the next answer: shortly as long as the images that were sent may have been missed."""
     return TIMEOUT_S if any(message.header.stamp.to_nsec() in sent for message in messages[-5:]) else IMPATIENCE_S
-
-
-def _within(timeout_s, condition):
-    deadline_s = time.monotonic() + timeout_s
-    while not condition():
-        if time.monotonic() > deadline_s:
-            return False
-        time.sleep(0.002)
-    return True
 
 
 def _scene(number):
