@@ -103,7 +103,6 @@ def reader(tmp_path_factory):
 
 @pytest.fixture(scope='session')
 def recording(tmp_path_factory):
-    """The path of a recording of a RealSense."""
     from support.realsense_recordings import FRAMES, SUFFIX, colored, sloping_depth, write_recording
     path = str(tmp_path_factory.mktemp('recording') / ('a' + SUFFIX))
     return write_recording(path, [colored(number) for number in range(FRAMES)], [sloping_depth()] * FRAMES)

@@ -31,5 +31,4 @@ def number_text(length_m, signed=False):
 
 
 def length_text(length_m, signed=False):
-    """Format a length in millimetres."""
     return '%s mm' % number_text(length_m, signed)

@@ -175,7 +175,6 @@ class PoseRig(object):
         return None if message is None else message.transforms[0]
 
     def add_transform(self, parent, child, pose):
-        """Send a transform of the driver."""
         self.connections.send('/tf', TFMessage(transform_messages(time_from(START_NS), [(parent, child, pose)])))
 
 

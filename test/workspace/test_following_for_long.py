@@ -15,7 +15,7 @@ from ros_3d_bb_lab.evaluation.scene_benchmark import detector_in, track_frame
 from ros_3d_bb_lab.simulation.driven_world import DrivenWorld
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import Simulator
-from support.pages import ROOT
+from support.code_blocks import ROOT
 
 LATENCY_S, PERIOD_S = 0.12, 0.05
 LEADER, SWITCHING_S = 1, 1.0  # longest time on another person whose track has taken over the ID

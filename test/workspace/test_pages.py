@@ -21,13 +21,16 @@ from ros_3d_bb.nodes.people_node import PeopleNode
 from ros_3d_bb.nodes.realsense_node import RealSenseNode
 from ros_3d_bb.planning.planner_outputs import NAMES
 from ros_3d_bb_lab.simulation.ros.simulator_node import SimulatorNode
-from support.code_blocks import BLOCKS, PAGES
+from support.code_blocks import BLOCKS, PAGES, ROOT
 from support.inputs import TARGETS, Blind, send_image
 from support.launching import loaded
 from support.masterless import masterless
-from support.pages import DOC, ROOT, node_pages
 from support.planner_definitions import package
 from support.standard_library import STANDARD_LIBRARY
+
+DOC = os.path.join(ROOT, 'doc')
+sys.path.insert(0, DOC)
+import node_pages  # noqa: E402 (needs the path)
 
 CONFIG = node_pages.config_files()
 NODES = {node.name: node for node in node_pages.nodes()}

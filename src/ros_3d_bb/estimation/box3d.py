@@ -84,7 +84,6 @@ class Rejected(NamedTuple):
 
     @property
     def is_plausible(self) -> bool:
-        """As of a Box3D."""
         return False
 
 

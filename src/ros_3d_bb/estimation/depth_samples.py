@@ -112,7 +112,6 @@ class RectSamples(object):
         return True
 
     def on_body(self, layer: Layer) -> np.ndarray:
-        """Which samples are on the body of a Layer."""
         nearest_mm = max(layer.trunk_mm - BODY_HALF_DEPTH_MM, 0)
         return self._ahead_mm - np.uint16(nearest_mm) <= layer.trunk_mm + BODY_HALF_DEPTH_MM - nearest_mm
 

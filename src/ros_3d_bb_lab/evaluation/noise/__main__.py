@@ -16,7 +16,6 @@ from ros_3d_bb_lab.evaluation.tracking.recorded_detections import read_recording
 
 
 def main():
-    """Run the command `./run noise`."""
     arguments = _arguments()
     folder = pathlib.Path(arguments.out)
     try:

@@ -70,7 +70,6 @@ class CameraModel(NamedTuple):
 
 
 def thesis_bias_m(depth_m):
-    """Bias of depth in the thesis, metres."""
     depth_m = np.asarray(depth_m, float)
     at_end_m = np.polyval(THESIS_BIAS, THESIS_BIAS_UP_TO_M)
     return np.where(depth_m <= THESIS_BIAS_UP_TO_M, np.polyval(THESIS_BIAS, depth_m),

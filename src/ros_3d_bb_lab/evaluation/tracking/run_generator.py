@@ -222,7 +222,6 @@ def _observe(walks, row, pose, odometry, camera):
 
 
 def view_of(pose, camera):
-    """CameraView of the camera on a robot at a pose (3,)."""
     fixed_from_camera = np.eye(4)
     body = np.eye(3)
     body[:2, :2] = turned(pose[2], np.eye(2)).T

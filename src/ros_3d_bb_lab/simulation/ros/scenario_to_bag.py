@@ -60,7 +60,6 @@ def scenario_images(scenario, with_boxes=False):
 
 
 def scenario_to_bag():
-    """Run the command."""
     parser = argparse.ArgumentParser(prog='scenario_to_bag',
                                      description='Render a scenario to a bag with ground truth.')
     parser.add_argument('--compression', choices=('none', 'bz2', 'lz4'), default='lz4', help='default: lz4')
