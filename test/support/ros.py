@@ -88,9 +88,9 @@ def header_at(stamp_ns, frame_id='camera_color_optical_frame'):
     return Header(stamp=time_from(stamp_ns), frame_id=frame_id)
 
 
-def depth_message(stamp_ns, depth_mm, shape=(48, 64)):
+def depth_message(stamp_ns, depth_mm):
     """A depth image of one depth everywhere, 16UC1."""
-    return fill_image(Image(header=header_at(stamp_ns)), np.full(shape, depth_mm, np.uint16), '16UC1')
+    return fill_image(Image(header=header_at(stamp_ns)), np.full((48, 64), depth_mm, np.uint16), '16UC1')
 
 
 def camera_info(stamp_ns, width=64, height=48, focal=60.0):

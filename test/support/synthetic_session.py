@@ -49,9 +49,9 @@ def _image_of(x_m, z_m, random):
     return color, depth_mm.astype(np.uint16), box
 
 
-def _median_by_loops(depth_mm, box, stride=20):
+def _median_by_loops(depth_mm, box):
     """The thesis' estimate, written the slow way: nested loops, as its proof of concept."""
-    x1, y1, x2, y2 = box
+    (x1, y1, x2, y2), stride = box, 20
     columns, rows = -(-(x2 - x1) // stride), -(-(y2 - y1) // stride)
     left = x1 + (x2 - x1 - (columns - 1) * stride - 1) // 2
     top = y1 + (y2 - y1 - (rows - 1) * stride - 1) // 2

@@ -68,11 +68,11 @@ def test_the_range_is_learned_from_people_farther_away():
     assert range_m == pytest.approx(16.0, abs=0.1)
 
 
-def leave(detector, distance_m):
+def leave(detector):
     """A person stands there for two seconds and is then not detected. Returns how long the track is published."""
-    published = play(Tracker(detector=detector), 4, lambda time_s: [at(distance_m, 0)] if time_s < 2 else [])
+    published = play(Tracker(detector=detector), 4, lambda time_s: [at(4.0, 0)] if time_s < 2 else [])
     return published[60:].index([]) / 30.0
 
 
 def test_detectors_that_miss_people_often_end_tracks_later():
-    assert leave(DetectorModel(detection_probability=0.5), 4.0) > 2 * leave(DetectorModel(), 4.0)
+    assert leave(DetectorModel(detection_probability=0.5)) > 2 * leave(DetectorModel())

@@ -19,8 +19,8 @@ def speed_among(*tracks, velocity=(1.0, 0.0, 0.0), params=PARAMS, age_s=0.0, rob
     return highest_safe_speed(tracks, age_s, robot_from_tracks, velocity, params)
 
 
-def stopping_distance(speed_mps, params=PARAMS):
-    return speed_mps * params.reaction_time + speed_mps ** 2 / (2 * params.deceleration)
+def stopping_distance(speed_mps):
+    return speed_mps * PARAMS.reaction_time + speed_mps ** 2 / (2 * PARAMS.deceleration)
 
 
 def place_after(speed_mps, elapsed_s):
@@ -92,13 +92,12 @@ STEP, AHEAD = FIELD_OF_VIEW / (BEAMS - 1), (1.0, 0.0, 0.0)
 PILLAR = {'at': [4.0, 1.2], 'size': [0.7, 0.7, 2.2]}
 
 
-def corners_from(x, furniture=(PILLAR,), people_m=(), changed=None):
+def corners_from(x, furniture=(PILLAR,), people_m=()):
     """Corners (n, 2) in the map that a laser at (x, 0) sees, which looks along x."""
     room = scenario_from({'duration': 1, 'people': [], 'room': {
         'bounds': [-4, 13, -4, 4], 'height': 2.8, 'furniture': list(furniture)}}).room
     ranges_m = scan_ranges((x, 0.0, 0.0), room, people_m, [0.15] * len(people_m))
-    corners_m = blind_corners(ranges_m if changed is None else changed(ranges_m), (0.1, RANGE_M), -FIELD_OF_VIEW / 2,
-                              STEP)
+    corners_m = blind_corners(ranges_m, (0.1, RANGE_M), -FIELD_OF_VIEW / 2, STEP)
     assert corners_m.shape[1] == 3 and not corners_m[:, 2].any()
     return corners_m[:, :2] + [x, 0.0]
 
@@ -159,8 +158,8 @@ def test_an_obstacle_across_the_ends_of_a_full_circle_has_two_corners(first_deg,
     np.testing.assert_allclose(corners_m[:, 0], corner_m[0])
 
 
-def speed_at(x, corners_m, params=CORNERS, velocity=AHEAD):
-    return speed_before_corners(np.reshape(corners_m, (-1, 2)) - [x, 0.0], 0.0, velocity, SAFETY, params)
+def speed_at(x, corners_m, params=CORNERS):
+    return speed_before_corners(np.reshape(corners_m, (-1, 2)) - [x, 0.0], 0.0, AHEAD, SAFETY, params)
 
 
 def test_the_robot_slows_down_until_it_has_passed_the_corner():

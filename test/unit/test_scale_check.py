@@ -30,8 +30,8 @@ def test_seated_doubtful_and_truncated_people_are_not_counted(box):
     assert not any(check.factor([box]) for _ in range(2 * LATEST_PEOPLE))
 
 
-def boxes_of(depth, rects_px, camera, level_from_camera=LEVEL):
-    boxes = estimate_boxes(depth, rects_px, camera, estimator_named('foreground'), level_from_camera)
+def boxes_of(depth, rects_px, camera):
+    boxes = estimate_boxes(depth, rects_px, camera, estimator_named('foreground'), LEVEL)
     return [box for box in boxes if isinstance(box, Box3D)]
 
 

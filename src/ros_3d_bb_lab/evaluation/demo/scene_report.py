@@ -159,14 +159,14 @@ def paths_of(recording):
     return people, tracks
 
 
-def panels_of(bag, recording, color_topic='', count=PANELS):
+def panels_of(bag, recording, color_topic=''):
     """Colour images at regular intervals with their 2D boxes. Images with a message of 2D boxes are preferred.
 
     `color_topic` is the name of colour in the bag, if it is not that of the nodes.
     """
     stamps = [moment.stamp_ns for moment in recording.moments]
     stamps = [stamp_ns for stamp_ns in stamps if stamp_ns in recording.boxes] or stamps
-    wanted = set(stamps[pick] for pick in np.linspace(0, len(stamps) - 1, count + 2)[1:-1].astype(int))
+    wanted = set(stamps[pick] for pick in np.linspace(0, len(stamps) - 1, PANELS + 2)[1:-1].astype(int))
     panels = []
     topics = [absolute(color_topic)] if color_topic else topics_of_cameras(bag, COLOR_TOPIC)
     for _topic, message in messages_on(bag, topics):

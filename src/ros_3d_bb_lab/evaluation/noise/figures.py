@@ -85,10 +85,10 @@ def histograms(path, clusters, name):
     _save(figure, path)
 
 
-def _finish(figure, axes, path, x_label, y_label, legend_at='best'):
+def _finish(figure, axes, path, x_label, y_label):
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
-    axes.legend(fontsize=8, loc=legend_at)
+    axes.legend(fontsize=8)
     axes.grid(alpha=0.25)
     _save(figure, path)
 
