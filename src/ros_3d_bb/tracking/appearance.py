@@ -152,11 +152,16 @@ def returned(track: Any, others: Iterable[Any], departed: Iterable[Departed]) ->
         return None
     best = max(possible, key=lambda person: _evidence(ratios[person.id], []))
     alike = [ratios[number] for number in ratios if number in best.met or number in track.met]
-    likelihood = 1.0
-    for part, ratio in enumerate(ratios[best.id]):
+    return best if _odds(ratios[best.id], alike) >= RETURN_ODDS else None
+
+
+def _odds(ratios: Ratios, others: Iterable[Ratios]) -> float:
+    """Odds that a box shows a person, and not one of `others`, given the likelihood ratios."""
+    odds = 1.0
+    for part, ratio in enumerate(ratios):
         if ratio is not None:
-            likelihood *= ratio / (1 + sum(other[part] or 0 for other in alike))
-    return best if likelihood >= RETURN_ODDS else None
+            odds *= ratio / (1 + sum(other[part] or 0 for other in others))
+    return odds
 
 
 def _can_return(person: Departed, track: Any) -> bool:

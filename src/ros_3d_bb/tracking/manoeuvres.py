@@ -14,7 +14,7 @@ from typing import Any, List, Sequence, Tuple
 
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.association import HIDDEN_FEET_COST, height_cost
-from ros_3d_bb.tracking.kalman_filter import faster
+from ros_3d_bb.tracking.kalman_filter import State, faster
 from ros_3d_bb.tracking.measurement_model import Measurement
 from ros_3d_bb.tracking.track import HIT_CORRELATION_S, LatestBox, Track
 
@@ -56,15 +56,18 @@ def match_manoeuvres(tracks: Sequence[Track], measurements: Sequence[Measurement
                     is_within_reach(other, near[0]) for other in seen if other is not track):
                 pairs.append((track, near[0]))
     for track, measurement in pairs:
-        elapsed_s = (stamp_ns - track.last_ns) / NS
-        shift_m = _distance_m(track.latest, measurement)
-        if elapsed_s >= HIT_CORRELATION_S:
-            if _distance_m(track.state, measurement) >= shift_m:
-                track.state = track.state._replace(x=track.latest.x, y=track.latest.y, u=0.0, v=0.0)
-            shift_m = _distance_m(track.state, measurement)
-        speed_mps = max(shift_m - BESIDE_M, 0) / elapsed_s
-        track.state = faster(track.state, elapsed_s, speed_mps ** 2)
+        track.state = _released(track, measurement, (stamp_ns - track.last_ns) / NS)
     return pairs
+
+
+def _released(track: Track, measurement: Measurement, elapsed_s: float) -> State:
+    """The State of a track whose velocity is as uncertain as its motion to a measurement."""
+    state, shift_m = track.state, _distance_m(track.latest, measurement)
+    if elapsed_s >= HIT_CORRELATION_S:
+        if _distance_m(state, measurement) >= shift_m:
+            state = state._replace(x=track.latest.x, y=track.latest.y, u=0.0, v=0.0)
+        shift_m = _distance_m(state, measurement)
+    return faster(state, elapsed_s, (max(shift_m - BESIDE_M, 0) / elapsed_s) ** 2)
 
 
 def _is_within_reach(track: Track, measurement: Measurement, stamp_ns: int, may_move: bool,

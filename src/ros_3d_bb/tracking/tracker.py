@@ -204,19 +204,16 @@ class Tracker(object):
         self._update_matched(matches, log_noise_scale - max(before.log_noise_scale, 0), image)
         cameras = self._cameras_after(before, image, matches)
         missed = [track for track in tracks if track.id not in matched]
-        if missed:
-            mark_missed(missed, tracks, before.tracks, cameras, image.view.camera, observed_s,
-                        self._detector.detection_probability)
+        mark_missed(missed, tracks, before.tracks, cameras, image.view.camera, observed_s,
+                    self._detector.detection_probability)
         tracks, deleted = self._delete(tracks, image.stamp_ns)
         departed = departed_after(before.departed, deleted, image.stamp_ns) if self._params[0].max_age else ()
-        meet([track for track, _measurement in matches])
-        for track, _measurement in matches:
-            if track.is_confirmed and track.appearance is not None and track.appearance.is_new:
-                tracks, departed = _recognised(track, tracks, departed)
-        if len(matches) < len(measurements):
-            taken = set(number for _is_confirmed, number in matched.values())
-            unmatched = [measurement for measurement in measurements if measurement.number not in taken]
-            tracks += initiate(tracks, unmatched, image, period_s, self._params[0], self._rules, assign_id)
+        detected = [track for track, _measurement in matches]
+        meet(detected)
+        tracks, departed = _recognised(detected, tracks, departed)
+        taken = set(number for _is_confirmed, number in matched.values())
+        unmatched = [measurement for measurement in measurements if measurement.number not in taken]
+        tracks += initiate(tracks, unmatched, image, period_s, self._params[0], self._rules, assign_id)
         untracked_boxes = before.untracked_boxes + sum(track.hits for track in deleted if not track.is_confirmed)
         state = _State(tracks, image.stamp_ns, cameras, log_noise_scale, untracked_boxes, departed)
         return state, [(track_id,) + match for track_id, match in matched.items()]
@@ -224,8 +221,7 @@ class Tracker(object):
     def _predict(self, before: _State, stamp_ns: int) -> List[Track]:
         """Copies of the tracks, predicted to the image; the next steps change them."""
         elapsed_s = 0.0 if before.now_ns is None else (stamp_ns - before.now_ns) / NS
-        acceleration = self._params[0].acceleration
-        return [track.predicted(elapsed_s, acceleration) for track in before.tracks]
+        return [track.predicted(elapsed_s, self._params[0].acceleration) for track in before.tracks]
 
     def _measure(self, before: _State, image: DetectedImage, period_s: Optional[float]) -> List[Measurement]:
         """The measurements of the image, with the noise for the association: a learned scale that is too small must not
@@ -267,14 +263,17 @@ class Tracker(object):
         return kept, deleted
 
 
-def _recognised(track: Track, tracks: List[Track],
+def _recognised(detected: Iterable[Track], tracks: List[Track],
                 departed: Tuple[Departed, ...]) -> Tuple[List[Track], Tuple[Departed, ...]]:
-    """Give a new track the ID of a person who has returned, if it shows one. Returns the tracks without the former
-    track of this person, and the departed without this person."""
-    person = returned(track, [other for other in tracks if other.is_confirmed and other is not track], departed)
-    if person is None:
-        return tracks, departed
-    track.id, track.first_ns, track.appearance = person.id, person.first_ns, person.appearance
-    track.met = track.met | person.met
-    return ([other for other in tracks if other is track or other.id != person.id],
-            tuple(other for other in departed if other.id != person.id))
+    """Give new tracks of the detected ones the IDs of people who have returned. Returns the tracks without the former
+    tracks of these people, and the departed without them."""
+    for track in detected:
+        if not (track.is_confirmed and track.appearance is not None and track.appearance.is_new):
+            continue
+        person = returned(track, [other for other in tracks if other.is_confirmed and other is not track], departed)
+        if person is not None:
+            track.id, track.first_ns, track.appearance = person.id, person.first_ns, person.appearance
+            track.met = track.met | person.met
+            tracks = [other for other in tracks if other is track or other.id != person.id]
+            departed = tuple(other for other in departed if other.id != person.id)
+    return tracks, departed
