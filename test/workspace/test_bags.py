@@ -2,12 +2,13 @@ import csv
 import json
 import os
 import re
+import resource
 import subprocess
 
 import numpy as np
 import pytest
 import rosbag
-from std_msgs.msg import Header
+from std_msgs.msg import Header, String
 
 from ros_3d_bb.bags.bag_writer import write_bag
 from ros_3d_bb.conversions.camera_msgs import START_NS
@@ -194,3 +195,15 @@ def test_unusable_bags_are_rejected(tmp_path, monkeypatch, make, reason):
     with pytest.raises(SystemExit, match='%s.*%s.*no report was written' % (re.escape(path), reason)):
         main()
     assert set(os.listdir(str(tmp_path))) <= {'some.bag'}
+
+
+def test_a_full_disk_is_named_and_leaves_no_bag(tmp_path):
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20000, before[1]))
+    images = ((number + 1, [('noise', String(os.urandom(1000).hex()))]) for number in range(1000))
+    try:
+        with pytest.raises(OSError, match='File too large'):  # in place of: No space left on device
+            write_bag(images, str(tmp_path / 'some.bag'))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert os.listdir(str(tmp_path)) == []
