@@ -1,7 +1,6 @@
 """The estimator foreground: the depth layer of the object in each rectangle. See `box3d` for the conventions.
 
-The order of the objects and their masks are in `overlaps`, the layers in `depth_samples`, and what the image border
-hides in `body`.
+The order and the masks of objects are in `overlaps`, layers in `depth_samples`, and the image border in `body`.
 """
 import math
 from typing import Dict, List, Optional, Sequence, Tuple, Union
@@ -79,7 +78,8 @@ def _estimate(seen: ObjectInRect, flat_px: Sequence[float], geometry: ImageGeome
     """The Box3D of the object in a rectangle, whose undistorted edges are `flat_px`."""
     samples, kind, edges = seen.samples, seen.kind, seen.edges
     layer = samples.layer()
-    assert layer is not None  # a rectangle of which all is masked is not pending
+    if layer is None:
+        return Rejected(HIDDEN)
     on_body = samples.on_body(layer)
     reason = _without_object(samples, layer, on_body, may_repeat)
     if reason:
