@@ -63,7 +63,7 @@ def recent_others(cameras: Dict[str, CameraState], camera: str, stamp_ns: int) -
 
 def mark_missed(missed: Sequence[Track], tracks: Iterable[Track], before: Iterable[Track],
                 cameras: Dict[str, CameraState], camera: str, observed_s: float, detection_probability: float) -> None:
-    """Update undetected tracks in place: status, visibility, and the times for which they are unseen and missed.
+    """Update undetected tracks in place: status, visibility, track score, and the time for which they are unseen.
 
     An occluded person who is predicted to reappear but is not detected is assumed to stay behind the occluder: the
     track keeps its previous position. A person whose place is occupied does not become less certain than `PRESENT_M`,

@@ -78,14 +78,13 @@ class Track(object):
     `state` is a `kalman_filter.State`. `z_m` is the height of the centre and `z_m2` its variance; `size_m` are the
     extents; `lower_hits` and `upper_hits` count the detections that show the ends of the body. `hits` counts the
     detections, of which `first_ns` and `last_ns` are the first and the latest. `unseen_s` is the time since the latest
-    one, `missed_s` the part of it during which a detection was expected. `visibility` is that in the latest image of
-    each camera: SEEN, PRESENT, STAYED, or as `status`; since the stamps `since_ns`. `latest` is the `LatestBox`,
-    `log_odds` is the track score. `kind` is the class of the group that has the most of the filtered scores `votes`;
-    `score` is the filtered score of the detections, `detection` the `Detection.index` in the latest image.
-    `innovation_m` is that of the latest image if its noise is assumed, otherwise 0. `slow_mps` is the velocity,
-    filtered over `SLOW_S`. `misplaced` are the log odds that outliers have moved this track. `is_moving` is whether it
-    moved at the latest detection. `appearance` is the `Appearance`, None if unknown, and `met` are the IDs of the
-    tracks that were detected in an image together with this one.
+    one. `visibility` is that in the latest image of each camera: SEEN, PRESENT, STAYED, or as `status`; since the
+    stamps `since_ns`. `latest` is the `LatestBox`, and `log_odds` is the track score. `kind` is the class of the group
+    that has the most of the filtered scores `votes`; `score` is the filtered score of the detections, `detection` the
+    `Detection.index` in the latest image. `innovation_m` is that of the latest image if its noise is assumed, otherwise
+    0. `slow_mps` is the velocity, filtered over `SLOW_S`. `misplaced` are the log odds that outliers have moved this
+    track. `is_moving` is whether it moved at the latest detection. `appearance` is the `Appearance`, None if unknown,
+    and `met` are the IDs of the tracks that were detected in an image together with this one.
     """
 
     def __init__(self, track_id: int, measurement: Measurement, stamp_ns: int, camera: str, speed_mps: float,
@@ -101,7 +100,7 @@ class Track(object):
         _left, top, _right, bottom = detection.truncated_edges
         self.lower_hits, self.upper_hits = int(not bottom), int(not top)
         self.latest = LatestBox.of(measurement)
-        self.hits, self.first_ns, self.last_ns, self.unseen_s, self.missed_s = 1, stamp_ns, stamp_ns, 0.0, 0.0
+        self.hits, self.first_ns, self.last_ns, self.unseen_s = 1, stamp_ns, stamp_ns, 0.0
         self.status, self.innovation_m = VISIBLE, (0.0, 0.0)
         self.visibility, self.since_ns = {camera: SEEN}, {camera: stamp_ns}
         self.slow_mps, self.misplaced = (0.0, 0.0), 0.0
@@ -144,7 +143,7 @@ class Track(object):
         self.log_odds = min(total, MAX_TRACK_SCORE)
         is_repeated = stamp_ns - self.first_ns >= CONFIRMING_NS
         self.is_confirmed = self.is_confirmed or is_repeated and self.log_odds >= rules.confirming_log_odds
-        self.hits, self.last_ns, self.unseen_s, self.missed_s = self.hits + 1, stamp_ns, 0.0, 0.0
+        self.hits, self.last_ns, self.unseen_s = self.hits + 1, stamp_ns, 0.0
         self.status, self.detection = VISIBLE, detection.index
         limit_mps = rules.moving_speed * (STILL_MOVING if self.is_moving else 1)
         self.is_moving = math.hypot(state.u, state.v) >= limit_mps
@@ -179,7 +178,7 @@ class Track(object):
 
     def miss(self, status: int, unseen_s: float, missed_s: float, detection_probability: float) -> None:
         """Mark this track as not detected for `unseen_s` and not detected where a camera should for `missed_s`."""
-        self.status, self.unseen_s, self.missed_s = status, self.unseen_s + unseen_s, self.missed_s + missed_s
+        self.status, self.unseen_s = status, self.unseen_s + unseen_s
         self.log_odds += min(missed_s / MISS_CORRELATION_S, 1) * math.log(1 - detection_probability)
         self.innovation_m = 0.0, 0.0
 
