@@ -6,21 +6,15 @@ from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.estimation.box3d import LEVEL, Box3D, Rejected, plausible
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
+from ros_3d_bb_lab.evaluation.ablation.views import detected_boxes, simulator_of
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_path
-from ros_3d_bb_lab.simulation.scenario import read_scenario, scenario_from
+from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import Simulator
 
 SCATTER = 0.015  # standard deviation of the edges of detected boxes, relative to the box
 CHI_SQUARE_95 = 5.991  # 2 degrees of freedom
 
 pytestmark = pytest.mark.slow
-
-
-def simulator_of(people, height_m, tilt_deg=0, seconds=0.2, rate=5.0, seed=0, furniture=(), wall_m=14.0):
-    robot = {'mount': [0.0, 0.0, height_m - 0.065], 'pitch': np.radians(tilt_deg)}
-    room = {'bounds': [-4.0, wall_m, -7.0, 7.0], 'height': 4.0, 'furniture': list(furniture)}
-    return Simulator(scenario_from({'duration': seconds, 'rate': rate, 'seed': seed, 'robot': robot, 'people': people,
-                                    'room': room}))
 
 
 def overlapping_people(count, nearest_m, farthest_m, random):
@@ -33,16 +27,6 @@ def overlapping_people(count, nearest_m, farthest_m, random):
             people.append({'start': position_m.tolist(), 'facing': random.uniform(-3, 3),
                            'moves': [{'to': (position_m + random.uniform(-1, 1, 2)).tolist()}]})
     return people
-
-
-def detected_boxes(frame, camera, random, least_visible):
-    """Visible people and their 2D boxes as a detector draws them."""
-    people = [person for person in frame.people if person.box_px is not None and person.visible >= least_visible]
-    boxes_px = np.array([person.box_px for person in people], float).reshape(-1, 4)
-    extents_px = np.tile(boxes_px[:, 2:] - boxes_px[:, :2], 2)
-    boxes_px += random.normal(0, SCATTER, boxes_px.shape) * extents_px
-    boxes_px = np.rint(np.clip(boxes_px, 0, [camera.width, camera.height] * 2)).astype(int)
-    return people, [tuple(box_px) for box_px in boxes_px.tolist()]
 
 
 class Scene(object):
@@ -73,7 +57,7 @@ def estimates(simulators, knows_tilt, least_visible=0.3):
     for simulator in simulators:
         for number in range(simulator.frame_count):
             scene = Scene(simulator, simulator.frame(number))
-            people, rects_px = detected_boxes(scene.frame, scene.camera, random, least_visible)
+            people, rects_px = detected_boxes(scene.frame, scene.camera, random, least_visible, SCATTER)
             boxes = scene.boxes(rects_px, knows_tilt=knows_tilt)
             found += [(person, box, scene) for person, box in zip(people, boxes) if isinstance(box, Box3D)]
             missed += sum(isinstance(box, Rejected) for box in boxes)
@@ -158,7 +142,7 @@ def test_a_child_before_an_adult(height_m, adult_m, gap_m):
                                 {'start': [adult_m, 0.0], 'facing': 3.1, 'height': 1.8}], height_m))
     random = np.random.RandomState(0)
     for _draw in range(20):
-        _people, rects_px = detected_boxes(scene.frame, scene.camera, random, 0)
+        _people, rects_px = detected_boxes(scene.frame, scene.camera, random, 0, SCATTER)
         assert abs(scene.boxes(rects_px)[0].center_m[2] - scene.depths_m[0]) < 0.25
 
 

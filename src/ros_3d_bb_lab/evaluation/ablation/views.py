@@ -1,5 +1,5 @@
 """Simulated views of people in several postures, among furniture and each other, from several mounts of a camera."""
-from typing import Iterator, List, NamedTuple
+from typing import Any, Iterator, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
@@ -35,12 +35,31 @@ def simulated_views() -> Iterator[View]:
                      for _ in range(random.randint(1, 4))]
         people = [{'start': [3.0, number], 'height': random.uniform(1.5, 1.95)}
                   for number in range(random.randint(2, 5))]
-        simulator = Simulator(scenario_from({
-            'duration': 0.2, 'rate': 5.0, 'seed': seed, 'people': people,
-            'robot': {'mount': [0.0, 0.0, height_m - 0.065], 'pitch': np.radians(tilt_deg)},
-            'room': {'bounds': [-4.0, random.uniform(5.5, 9.5), -7.0, 7.0], 'height': 4.0, 'furniture': furniture}}))
+        simulator = simulator_of(people, height_m, tilt_deg, seed=seed, furniture=furniture,
+                                 wall_m=random.uniform(5.5, 9.5))
         for _ in range(IMAGES):
             yield _view(simulator, random)
+
+
+def simulator_of(people: Sequence[dict], height_m: float, tilt_deg: float = 0, seconds: float = 0.2, rate: float = 5.0,
+                 seed: int = 0, furniture: Sequence[dict] = (), wall_m: float = 14.0) -> Simulator:
+    """A Simulator of people and furniture before a wall, seen from a camera at a height."""
+    robot = {'mount': [0.0, 0.0, height_m - 0.065], 'pitch': np.radians(tilt_deg)}
+    room = {'bounds': [-4.0, wall_m, -7.0, 7.0], 'height': 4.0, 'furniture': list(furniture)}
+    return Simulator(scenario_from({'duration': seconds, 'rate': rate, 'seed': seed, 'robot': robot, 'people': people,
+                                    'room': room}))
+
+
+def detected_boxes(frame: Any, camera: Camera, random: np.random.RandomState, least_visible: float,
+                   scatter: float) -> Tuple[List[Any], List[tuple]]:
+    """Visible people and their 2D boxes as a detector draws them; `scatter` is the standard deviation of their edges,
+    relative to the box."""
+    people = [person for person in frame.people if person.box_px is not None and person.visible >= least_visible]
+    boxes_px = np.array([person.box_px for person in people], float).reshape(-1, 4)
+    extents_px = np.tile(boxes_px[:, 2:] - boxes_px[:, :2], 2)
+    boxes_px += random.normal(0, scatter, boxes_px.shape) * extents_px
+    boxes_px = np.rint(np.clip(boxes_px, 0, [camera.width, camera.height] * 2)).astype(int)
+    return people, [tuple(box_px) for box_px in boxes_px.tolist()]
 
 
 def _place(random: np.random.RandomState) -> List[float]:
@@ -58,12 +77,8 @@ def _view(simulator: Simulator, random: np.random.RandomState) -> View:
         people.append(person._replace(position_m=place_m, heading_rad=random.uniform(-3, 3), posture=posture))
     frame = simulator.frame(0, state._replace(people=people))
     camera_from_map = np.linalg.inv(frame.poses.map_from_camera)
-    seen = [person for person in frame.people if person.box_px is not None and person.visible >= LEAST_VISIBLE]
-    boxes_px = np.array([person.box_px for person in seen], float).reshape(-1, 4)
-    boxes_px += random.normal(0, SCATTER, boxes_px.shape) * np.tile(boxes_px[:, 2:] - boxes_px[:, :2], 2)
-    boxes_px = np.rint(np.clip(boxes_px, 0, [640, 480] * 2)).astype(int)
-    return View(DepthImage(frame.depth_mm, 0.001), simulator.camera, camera_from_map[:3, 2],
-                list(map(tuple, boxes_px.tolist())),
+    seen, rects_px = detected_boxes(frame, simulator.camera, random, LEAST_VISIBLE, SCATTER)
+    return View(DepthImage(frame.depth_mm, 0.001), simulator.camera, camera_from_map[:3, 2], rects_px,
                 [transform_points(camera_from_map, person.position_m) for person in seen])
 
 
