@@ -146,10 +146,11 @@ def test_an_output_waits_for_the_transform_of_its_own_frame_only():
         assert bridge.counts['no transform'] == 3
 
 
-def test_an_output_that_raises_is_counted_and_the_others_are_published():
+@pytest.mark.parametrize('write', [lambda tracks, *_given: tracks[0].no_such_field, lambda *_given: 'no message'])
+def test_an_output_that_raises_is_counted_and_the_others_are_published(write):
     with bridge_with('costmap, mpc', planner_frame='map') as bridge:
         broken, = [topic for topic in bridge.node._topics if topic.output.topic == MPC]
-        broken.output = broken.output._replace(write=lambda tracks, *_given: tracks[0].no_such_field)
+        broken.output = broken.output._replace(write=write)
         bridge.send_tf(START_NS, 'base_link', (3, 0, 0))
         bridge.send(START_NS, person(1, 2, 0))
         assert bridge.count(POINTS) == 1 and bridge.count(MPC) == 0

@@ -84,11 +84,11 @@ class PlannerTopic(object):
         header = Header(stamp=time_from(0 if output.latest_tf else stamp_ns), frame_id=frame_id)
         try:
             message = output.write(tracks, received.transforms[output.frame, output.latest_tf], header)
+            if message is not None:
+                self._publisher.publish(message)
         except Exception as error:  # a fault of one output must not keep the tracks from the others
-            self._diagnostics.warn('outputs failed', '%s cannot be computed (%r); the other outputs are published, '
+            self._diagnostics.warn('outputs failed', '%s cannot be published (%r); the other outputs are published, '
                                    'and this one is tried again with the next tracks' % (output.topic, error))
-            return
-        self._publisher.publish(message)
 
     def empty(self, stamp_ns):
         """Publish an empty array in the frame of the last one, if planners need it."""

@@ -18,9 +18,9 @@ CLEARING_HEIGHT_M = 0.5  # above the robot's frame, within the height range of c
 class Output(NamedTuple):
     """One published topic.
 
-    `write(tracks, frame_from_tracks, header)` builds the message from tracks in their original frame. `frame` is the
-    frame of the message's coordinates; if empty, the frame of the tracks is used, for planners that transform messages
-    themselves. `to_now` states that the planner takes positions as current: they are predicted to the current time, and
+    `write(tracks, frame_from_tracks, header)` builds the message from tracks in their original frame; None: nothing is
+    published. `frame` is the frame of the message's coordinates; if empty, the frame of the tracks is used, for
+    planners that transform messages themselves. `to_now` states that the planner takes positions as current: they are predicted to the current time, and
     published again while no new tracks arrive; otherwise positions are those at the stamp of the image. `latest_tf`
     states that the planner applies the latest transform, or drops positions for which tf is older than their stamp: the
     stamp is 0, for which tf2 takes the latest transform. `float32` states that the message stores coordinates as
@@ -38,7 +38,8 @@ class Output(NamedTuple):
 
 
 # Outputs whose message type, given by name, is defined in a package that may not be installed. `write` takes tracks in
-# the output frame, the header and the `msg` module of the package. `frame` is the name of a parameter.
+# the output frame, the header and the `msg` module of the package. `frame` is the name of a parameter of
+# PlannerBridgeParams, or empty.
 OPTIONAL = {
     'people': Output('/people', 'people_msgs/People', people_to_msg, to_now=True, latest_tf=True),
     'teb': Output('~obstacles', 'costmap_converter/ObstacleArrayMsg', obstacles_to_msg, 'planner_frame', to_now=True,
@@ -69,7 +70,8 @@ def _optional_output(name, params):
 
     def write(tracks, frame_from_tracks, header):
         return output.write(in_frame(tracks, frame_from_tracks), header, messages)
-    return output._replace(kind=getattr(messages, kind), write=write, frame=getattr(params, output.frame, ''))
+    return output._replace(kind=getattr(messages, kind), write=write,
+                           frame=getattr(params, output.frame) if output.frame else '')
 
 
 def _costmap_outputs(params):
