@@ -71,7 +71,9 @@ def test_each_node_has_a_script():
 
 @pytest.mark.parametrize('path', sorted(CONFIG))
 def test_parameter_files_are_up_to_date(path):
-    with open(os.path.join(ROOT, path), encoding='utf-8') as stream:
+    file = os.path.join(ROOT, path)
+    assert os.path.exists(file), 'missing; write it with ./run config'
+    with open(file, encoding='utf-8') as stream:
         assert stream.read() == CONFIG[path], 'outdated; write it with ./run config'
 
 

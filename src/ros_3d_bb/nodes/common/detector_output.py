@@ -9,6 +9,7 @@ from std_srvs.srv import SetBool, SetBoolResponse
 from ros_3d_bb.conversions.image_msgs import fill_image
 from ros_3d_bb.conversions.perception_msgs import detections2d_to_msg, stamp_of
 from ros_3d_bb.core.detection_pace import DetectionPace
+from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.core.latest_worker import NewestWorker
 from ros_3d_bb.visualization.image_overlay import draw_boxes
 
@@ -99,7 +100,8 @@ class DetectorWorker(object):
                                    'up with the camera' % (self.pace.interval, size))
 
     def _on_error(self, error):
-        self._diagnostics.warn('detections failed', 'the detector failed: %s; waiting for the next image' % error)
+        self._diagnostics.warn('detections failed',
+                               'the detector failed: %s; waiting for the next image' % cause(error))
 
     def _faults(self):
         since_s, now_s = self._waits_since_s, time.monotonic()

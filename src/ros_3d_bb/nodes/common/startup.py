@@ -13,8 +13,9 @@ from ros_3d_bb.nodes.common.master import cache_logging_parameter
 PARAMS_FILES = {'%s_node' % name: '%s_params' % name for name in (
     'bbox3d', 'camera_pose', 'detector', 'planner_bridge', 'realsense', 'tracker', 'viewer')}
 PARAMS_FILES.update({'%s_node' % name: 'params' for name in ('follow', 'people_removal', 'speed_limit')})
-# Parameters that are named by the launch argument of the same name, not by a file, which few have for them.
-ARGUMENTS = 'detector', 'weights', 'scenario', 'window', 'frame_id'
+# Parameters that have a launch argument of their own. Few users have a file for them.
+ARGUMENTS = dict(detector='detector', weights='weights', scenario='scenario', window='window', frame_id='frame_id',
+                 outputs='planner')
 POLL_S = 0.05
 SETTLING_S = 1.0  # a node that has connected to one topic may still be connecting to the others
 SENDING_S = 1.0  # from the last message to the exit: rospy drops messages that it has not sent before the shutdown
@@ -65,7 +66,7 @@ def launch_places(nodes):
 
     def place_of(name):
         if name in ARGUMENTS:
-            return 'launch argument %s:=' % name if any(stored.values()) else ''
+            return 'launch argument %s:=' % ARGUMENTS[name] if any(stored.values()) else ''
         files = sorted(argument for argument, params in stored.items() if name in params)
         return 'launch argument %s' % ' or '.join('%s:=FILE' % each for each in files) if files else ''
     return place_of
