@@ -72,4 +72,14 @@ def test_a_newcomer_does_not_push_a_person_to_the_track_of_another_one():
               for number, measurement, unseen_s in zip((1, 2), people_at(0.0, 0.4), (0.1, 0.3))]
     boxes = people_at(0.05, -0.3)
     assert set(allowed_costs(tracks, boxes, [0.0, 0.0], params, outliers)[0]) == {(0, 0), (0, 1), (1, 0)}
-    assert associate(tracks, boxes, [0.0, 0.0], 0, params, outliers) == [(tracks[0], boxes[0])]
+    assert associate(tracks, boxes, [0.0, 0.0], params, outliers) == [(tracks[0], boxes[0])]
+
+
+def test_people_are_distinguished_by_their_heads_if_feet_are_truncated():
+    """A child and an adult, whose positions an error exchanges."""
+    def people_at(child_y, adult_y):
+        return measured_at([at(2, y, cut='bottom', position_m=(2.0, y, head_m - 0.85), sigma=0.05)
+                            for y, head_m in ((child_y, 1.1), (adult_y, 1.8))])
+    tracks = [Track(number, measurement, 0, '', 0.8, 0.0) for number, measurement in enumerate(people_at(0.05, -0.05))]
+    boxes, params = people_at(-0.05, 0.05), TrackerParams()
+    assert associate(tracks, boxes, [0.0, 0.0], params, outlier_model(params)) == list(zip(tracks, boxes))

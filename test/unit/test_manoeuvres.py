@@ -49,7 +49,7 @@ def test_a_person_who_sits_down_stands_up_or_bends_keeps_the_id(rate_hz, heights
 
 def test_a_person_who_crouches_and_is_missed_once_keeps_the_id():
     def boxes_at(time_s):
-        return [] if 1.96 < time_s < 2.04 else [(3.0, 0.0, 1.7 if time_s < 2 else 1.3)]
+        return [] if 1.96 < time_s < 2.04 else [(3.0, 0.0, float(np.interp(time_s, (1.8, 2.2), (1.7, 1.3))))]
     assert len(all_ids(play(15, 4, boxes_at))) == 1
 
 

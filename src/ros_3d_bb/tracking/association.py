@@ -14,12 +14,12 @@ from ros_3d_bb.tracking.out_of_sequence import DetectedImage
 from ros_3d_bb.tracking.track import (ARRIVAL_S, LEGS_M, MIN_TRACK_SCORE, SEEN, Rules, Track, log_odds_of,
                                       log_odds_of_arrival)
 
-RECENT_NS = 6 * NS // 10  # tracks matched less than this ago are associated before the others; chosen
 UNSURE_SHARE = 0.1  # upper bound of the new-target density, relative to the peak density of the detection; chosen
 HEAD_SIGMAS = 2.0  # standard deviation of the head top relative to that of the height; chosen: the camera tilts
-# Cost of a box whose top matches but whose height does not, as its legs are occluded; and if its lower end is so much
-# higher than the feet that it is hardly another person. Chosen: heights of people differ by less.
-HIDDEN_FEET_COST, HIDDEN_LEGS_COST = 4.0, 1.0
+HIDDEN_LEGS_COST = 1.0  # of a box whose top matches and whose lower end is too high for another person; chosen
+# Most cost of a height: people change their posture. It is -ln [P height_sigma sqrt(2 pi) / 1 m] if in P = 3 % of the
+# boxes, the height is anywhere within 1 m; P is chosen.
+POSTURE_COST = 5.0
 CROWD = 200  # pairs from which on arrays are faster than numbers; measured with `./run bench speed`
 # Of the birth of tracks. All are chosen; `./run bench tracking` and `./run bench scenes` show the effect of others.
 RECENTLY_MATCHED_NS = NS // 2  # no track starts near a track that was matched less than this ago
@@ -33,8 +33,8 @@ Gate = Tuple[float, float, float]  # see `_gate`
 
 
 def associate(tracks: Sequence[Track], measurements: Sequence[Measurement], detection_log_odds: Sequence[float],
-              stamp_ns: int, params: Any, outliers: OutlierModel) -> List[Tuple[Track, Measurement]]:
-    """Assign measurements to tracks in a cascade: recently matched, then missed, then tentative tracks.
+              params: Any, outliers: OutlierModel) -> List[Tuple[Track, Measurement]]:
+    """Assign measurements to confirmed tracks first, and then to tentative ones.
 
     A pair is allowed only if it is more likely than that the measurement is of a new target and the track is missed
     (the gate), and both have the same group of classes. Of the allowed pairs, those are selected that explain all
@@ -43,15 +43,13 @@ def associate(tracks: Sequence[Track], measurements: Sequence[Measurement], dete
     (Track, Measurement).
     """
     matches = []
-    ranks: Dict[int, Costs] = {}
+    ranks: Dict[bool, Costs] = {True: {}, False: {}}
     taken: Set[int] = set()
     costs, nearer = allowed_costs(tracks, measurements, detection_log_odds, params, outliers)
     for pair, cost in costs.items():
-        track = tracks[pair[0]]
-        rank = int(stamp_ns - track.last_ns >= RECENT_NS) if track.is_confirmed else 2
-        ranks.setdefault(rank, {})[pair] = cost
-    for rank in sorted(ranks):
-        costs = {pair: cost for pair, cost in ranks[rank].items() if pair[1] not in taken} if taken else ranks[rank]
+        ranks[tracks[pair[0]].is_confirmed][pair] = cost
+    for is_confirmed in (True, False):
+        costs = {pair: cost for pair, cost in ranks[is_confirmed].items() if pair[1] not in taken}
         for row, column in costs if len(costs) == 1 else _assigned(costs):
             track, measurement = tracks[row], measurements[column]
             matches.append((track, measurement._replace(is_nearer=True) if (row, column) in nearer else measurement))
@@ -187,9 +185,9 @@ def height_cost(track: Track, measurement: Measurement, sigma_m: float) -> float
     """Association cost of the height difference: its negative log likelihood, 0 for the same height.
 
     The height is unknown if the image border truncates the box, or has truncated all previous boxes of the track. The
-    tops of the heads are then compared if both are known; otherwise the cost is 0. Where the height is known, the cost
-    is at most that of the tops plus `HIDDEN_FEET_COST` or `HIDDEN_LEGS_COST`, because furniture occludes only the lower
-    part of a body.
+    tops of the heads are then compared if both are known; otherwise the cost is 0. As furniture occludes only the lower
+    part of a body, a box without legs costs at most that of the tops plus `HIDDEN_LEGS_COST`. No cost is above
+    `POSTURE_COST`.
     """
     _left, is_top_cut, _right, is_bottom_cut = measurement.detection.truncated_edges
     if not track.upper_hits or is_top_cut:
@@ -200,9 +198,11 @@ def height_cost(track: Track, measurement: Measurement, sigma_m: float) -> float
     higher_m = track.z_m + height_m / 2 - measurement.z - seen_m / 2
     top_cost = (higher_m / (HEAD_SIGMAS * sigma_m)) ** 2 / 2
     if not track.lower_hits or is_bottom_cut:
-        return top_cost
-    hidden_cost = HIDDEN_LEGS_COST if abs(height_m - seen_m - higher_m) > LEGS_M else HIDDEN_FEET_COST
-    return min(((height_m - seen_m) / sigma_m) ** 2 / 2, top_cost + hidden_cost)
+        return min(top_cost, POSTURE_COST)
+    costs = [((height_m - seen_m) / sigma_m) ** 2 / 2, POSTURE_COST]
+    if abs(height_m - seen_m - higher_m) > LEGS_M:
+        costs.append(top_cost + HIDDEN_LEGS_COST)
+    return min(costs)
 
 
 def _assigned(costs: Costs) -> List[Pair]:

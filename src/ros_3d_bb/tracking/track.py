@@ -58,18 +58,16 @@ class Rules(NamedTuple):
 
 
 class LatestBox(NamedTuple):
-    """Position of the latest detection, and the height of its upper end, or of the image border that truncates it;
-    whether it was nearer than the track by the offset of outliers."""
+    """Position of the latest detection, and whether it was nearer than the track by the offset of outliers."""
 
     x: float
     y: float
-    head_m: float
     is_nearer: bool
 
     @classmethod
     def of(cls, measurement: Measurement) -> 'LatestBox':
         """The LatestBox of a Measurement."""
-        return cls(measurement.x, measurement.y, measurement.z + measurement.size_m[2] / 2, measurement.is_nearer)
+        return cls(measurement.x, measurement.y, measurement.is_nearer)
 
 
 class Track(object):

@@ -195,7 +195,7 @@ class Tracker(object):
         tracks = self._predict(before, image.stamp_ns)
         measurements = self._measure(before, image, period_s)
         log_odds = detection_log_odds_of(tracks, image.view.camera, period_s, self._detector.detection_probability)
-        matches = associate(tracks, measurements, log_odds, image.stamp_ns, self._params[0], self._rules.outliers)
+        matches = associate(tracks, measurements, log_odds, self._params[0], self._rules.outliers)
         if len(matches) < len(measurements) and latest:
             matches += match_manoeuvres(tracks, measurements, matches, latest.stamp_ns, image.stamp_ns,
                                         self._params[0].height_sigma)

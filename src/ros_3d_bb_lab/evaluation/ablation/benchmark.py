@@ -93,7 +93,7 @@ MECHANISMS = tuple(Mechanism(*row) for row in (
     ('correlated images', 'tracking.tracker', 'correlated_images', lambda *_: 1.0),
     ('heights', 'tracking.association', 'height_cost', lambda *_: 0.0),
     ('missed detections', 'tracking.tracker', 'detection_log_odds_of', lambda tracks, *_: [0.0] * len(tracks)),
-    ('recent tracks first', 'tracking.association', 'RECENT_NS', 10 ** 18),
+    ('postures', 'tracking.association', 'POSTURE_COST', 1e9),
     ('outliers that follow each other', 'tracking.track', 'OUTLIER_CORRELATION_S', 1e-9),
     ('slow velocity', 'tracking.prediction', 'SLOW_SHARE', 0.0),
     ('manoeuvres in predictions', 'tracking.prediction', 'PredictionParams.manoeuvre_acceleration', 0.0),
