@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE
 from ros_3d_bb_lab.evaluation.clear_mot import GATE_M, Moment, score
+from ros_3d_bb_lab.evaluation.matching import plane_distances
 from ros_3d_bb_lab.evaluation.tracking.metrics import trackeval_results
 from support.tracks import track_at
 

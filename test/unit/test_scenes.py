@@ -9,9 +9,9 @@ import pytest
 
 from conftest import DATA
 from ros_3d_bb.estimation.error_model import read_error_model
-from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb_lab.evaluation.clear_mot import score
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, scenario_paths, scene_name
+from ros_3d_bb_lab.evaluation.matching import plane_distances
 from ros_3d_bb_lab.evaluation.scene_benchmark import (RANGE_M, detector_in, detections_without_scores,
                                                       exact_detector, result_of, run_scene, score_detections,
                                                       yolov5_detector)

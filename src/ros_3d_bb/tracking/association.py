@@ -270,20 +270,3 @@ def duplicates(tracks: Sequence[Track], stamp_ns: int) -> Set[int]:
 def _are_same(track: Track, other: Track) -> bool:
     distance_m = math.hypot(track.state.x - other.state.x, track.state.y - other.state.y)
     return distance_m < SAME_PERSON_M and track.kind.group == other.kind.group
-
-
-def plane_distances(positions: Any, others: Any) -> np.ndarray:
-    """Distances (n, m) in the x-y plane between points (n, 3) and (m, 3), metres."""
-    difference = np.asarray(positions, float)[:, None, :2] - np.asarray(others, float)[None, :, :2]
-    return np.linalg.norm(difference, axis=2)
-
-
-def assign(costs: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """Rows and columns (k,) of the maximum number of allowed pairs with the minimum total cost; `costs` (n, m) are inf
-    for pairs that are not allowed.
-    """
-    allowed = np.isfinite(costs)
-    forbidden = 1e6 + np.abs(costs[allowed]).sum()
-    rows, columns = linear_sum_assignment(np.where(allowed, costs, forbidden))
-    is_allowed = allowed[rows, columns]
-    return rows[is_allowed], columns[is_allowed]

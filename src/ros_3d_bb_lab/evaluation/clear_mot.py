@@ -11,8 +11,8 @@ from typing import List, NamedTuple
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.association import assign, plane_distances
 from ros_3d_bb.tracking.types import VISIBLE, TrackedObject
+from ros_3d_bb_lab.evaluation.matching import assign, plane_distances
 
 GATE_M = 1.0
 KEPT = 1000  # score of a kept match; other matches have 0.5 at the gate to 1 at distance 0, as in TrackEval

@@ -14,13 +14,13 @@ from ros_3d_bb.estimation.box3d import plausible
 from ros_3d_bb.estimation.box3d_estimator import estimate_boxes, estimator_named, level_rotation
 from ros_3d_bb.estimation.error_model import corrected_boxes, read_error_model
 from ros_3d_bb.pipeline.detectors import without_weights
-from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import VISIBLE, CameraView, detections_from_boxes
 from ros_3d_bb_lab.evaluation.clear_mot import ClearMatcher, Moment, distance_m, score
 from ros_3d_bb_lab.evaluation.defaults import SIMULATED_ERROR_MODEL, add_scenarios, scene_name
 from ros_3d_bb_lab.evaluation.detectors import detector_of
+from ros_3d_bb_lab.evaluation.matching import plane_distances
 from ros_3d_bb_lab.evaluation.text_table import line_of
 from ros_3d_bb_lab.simulation.scenario import read_scenario
 from ros_3d_bb_lab.simulation.simulator import D435I_COLOR, SimulatedFrame, Simulator, is_in_image, jittered_boxes

@@ -10,8 +10,8 @@ import numpy as np
 
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
+from ros_3d_bb_lab.evaluation.matching import plane_distances
 
 LONGEST_MISSED = 30  # images
 ALPHA = 0.2

@@ -11,9 +11,9 @@ import numpy as np
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.core.detector_model import DetectorModel
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.association import assign, plane_distances
 from ros_3d_bb.tracking.types import VISIBLE
 from ros_3d_bb_lab.evaluation.error_model_fit import fit_error_model
+from ros_3d_bb_lab.evaluation.matching import assign, plane_distances
 from ros_3d_bb_lab.evaluation.tracking.metrics import PAIRED_M
 
 BAND_M, LEAST_IN_BAND = 4.0, 20  # bands of range, and images of people that one needs, for the detection probability

@@ -12,8 +12,8 @@ import io
 
 import numpy as np
 
-from ros_3d_bb.tracking.association import assign, plane_distances
 from ros_3d_bb.tracking.types import VISIBLE
+from ros_3d_bb_lab.evaluation.matching import assign, plane_distances
 from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S
 
 PAIRED_M, MATCHED_M = 1.0, 0.5

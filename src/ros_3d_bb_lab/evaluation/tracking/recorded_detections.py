@@ -14,8 +14,8 @@ import numpy as np
 
 from ros_3d_bb.camera.camera_model import Camera, transform_from, transform_points
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb.tracking.types import OUT_OF_VIEW, VISIBLE, CameraView, Detection
+from ros_3d_bb_lab.evaluation.matching import plane_distances
 from ros_3d_bb_lab.evaluation.tracking.run_generator import HORIZONS_S, UNSCORED_M, Image, RunTruth
 from ros_3d_bb_lab.evaluation.tracking.trajectories import pedestrian_of, read_rows
 

@@ -9,8 +9,8 @@ from typing import List, NamedTuple, Tuple
 import numpy as np
 
 from ros_3d_bb.core.time_sync import NS
-from ros_3d_bb.tracking.association import plane_distances
 from ros_3d_bb.tracking.types import OCCLUDED, OUT_OF_VIEW, VISIBLE, CameraView, Detection
+from ros_3d_bb_lab.evaluation.matching import plane_distances
 from ros_3d_bb_lab.evaluation.tracking.d435_model import CameraModel, half_width, shown
 from ros_3d_bb_lab.evaluation.tracking.detection_generator import HARD_TO_SEE, DetectablePerson, Detector
 from ros_3d_bb_lab.evaluation.tracking.robot_motion import (PERIOD_S, STANDING, OdometryModel, bearing_of, driving,

@@ -12,8 +12,8 @@ import numpy as np
 
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.detection.boxes import iou
-from ros_3d_bb.tracking.association import assign
 from ros_3d_bb.tracking.types import VISIBLE
+from ros_3d_bb_lab.evaluation.matching import assign
 from ros_3d_bb_lab.evaluation.tracking.metrics import trackeval_results
 
 FOUND_IOU, LEAST_VISIBLE, ON_UNSCORED, ON_PERSON = 0.5, 0.5, 0.5, 0.5
