@@ -1,12 +1,12 @@
 """Matching of tracks and detections with the ground truth."""
 import numpy as np
 from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import cdist
 
 
 def plane_distances(positions, others):
     """Distances (n, m) in the x-y plane between points (n, 3) and (m, 3), metres."""
-    difference = np.asarray(positions, float)[:, None, :2] - np.asarray(others, float)[None, :, :2]
-    return np.linalg.norm(difference, axis=2)
+    return cdist(np.asarray(positions, float)[:, :2], np.asarray(others, float)[:, :2])
 
 
 def assign(costs):

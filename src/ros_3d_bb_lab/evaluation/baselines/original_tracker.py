@@ -7,11 +7,11 @@ only if there are fewer tracks than boxes, and only from boxes that are not as f
 own box. If an exception occurs, the image is skipped, as rospy does.
 """
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from ros_3d_bb.camera.camera_model import transform_points
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.types import OCCLUDED, VISIBLE, TrackedObject
-from ros_3d_bb_lab.evaluation.matching import plane_distances
 
 LONGEST_MISSED = 30  # images
 ALPHA = 0.2
@@ -77,8 +77,8 @@ class OriginalTracker(object):
             for track in self._tracks:  # modified while iterating: every second deletion is skipped, as in the original
                 self._miss(track)
             return
-        distances_m = plane_distances(np.reshape([track.position_m for track in self._tracks], (-1, 3)),
-                                      [detection.position_m for detection in detections])
+        distances_m = cdist(np.reshape([track.position_m[:2] for track in self._tracks], (-1, 2)),
+                            [detection.position_m[:2] for detection in detections])
         matched_m = self._move_matched(distances_m, detections)
         taken = set(column for _row, column in matched_m)
         if len(self._tracks) > len(detections):
