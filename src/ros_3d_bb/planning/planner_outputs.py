@@ -20,11 +20,12 @@ class Output(NamedTuple):
 
     `write(tracks, frame_from_tracks, header)` builds the message from tracks in their original frame; None: nothing is
     published. `frame` is the frame of the message's coordinates; if empty, the frame of the tracks is used, for
-    planners that transform messages themselves. `to_now` states that the planner takes positions as current: they are predicted to the current time, and
-    published again while no new tracks arrive; otherwise positions are those at the stamp of the image. `latest_tf`
-    states that the planner applies the latest transform, or drops positions for which tf is older than their stamp: the
-    stamp is 0, for which tf2 takes the latest transform. `float32` states that the message stores coordinates as
-    float32. `is_emptied` states that an empty array is published when the tracks are outdated; otherwise nothing is.
+    planners that transform messages themselves. `to_now` states that the planner takes positions as current: they are
+    predicted to the current time, and published again while no new tracks arrive; otherwise positions are those at the
+    stamp of the image. `latest_tf` states that the planner applies the latest transform, or drops positions for which
+    tf is older than their stamp: the stamp is 0, for which tf2 takes the latest transform. `float32` states that the
+    message stores coordinates as float32. `is_emptied` states that an empty array is published when the tracks are
+    outdated; otherwise nothing is.
     """
 
     topic: str
