@@ -172,8 +172,8 @@ def test_people_are_upright_for_any_mount_of_the_camera(roll_deg, size_m, edge):
 
 def test_tracks_survive_and_fill_every_field():
     prediction_m, variances = np.array([[1.5, 2, 3], [2, 2, 3]]), np.array([2 * np.eye(3), 3 * np.eye(3)])
-    sent = Track(7, np.array([1.0, 2, 3]), np.array([0.5, 0.5, 1.7]), np.array([1.0, 0, 0]), np.zeros(3), VISIBLE,
-                 True, NS, 2 * NS, prediction_m, 0.5, np.diag([0.01, 0.02, 0.03, 0.04, 0.05, 0.06]), variances)
+    sent = Track(7, np.array([1.0, 2, 3]), np.array([0.5, 0.5, 1.7]), np.array([1.0, 0, 0]), VISIBLE, True, NS,
+                 2 * NS, prediction_m, 0.5, np.diag([0.01, 0.02, 0.03, 0.04, 0.05, 0.06]), variances)
     for track in sent, sent._replace(covariance=None, prediction_covariance_m2=None):
         message = on_the_wire(tracks_to_msg([track], header_at(2 * NS, 'map')))
         back, = tracks_from_msg(message)

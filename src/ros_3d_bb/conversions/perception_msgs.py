@@ -336,7 +336,7 @@ def _track_from_msg(track: Any) -> TrackedObject:
         covariance = np.zeros((6, 6))
         covariance[:3, :3], covariance[3:, 3:] = _covariance_3x3(track.pose), _covariance_3x3(track.twist)
         prediction_covariance_m2 = np.array([_covariance_3x3(pose) for pose in track.prediction]).reshape(-1, 3, 3)
-    return TrackedObject(track.id, _xyz(track.pose.pose.position), _xyz(track.size), velocity_mps, velocity_mps,
+    return TrackedObject(track.id, _xyz(track.pose.pose.position), _xyz(track.size), velocity_mps,
                          track.status, track.moving, track.first_seen.to_nsec(), track.last_seen.to_nsec(),
                          prediction_m, track.prediction_step.to_sec(), covariance, prediction_covariance_m2,
                          track.label or PERSON, track.score, track.detection)

@@ -67,7 +67,7 @@ def transformed(tracks: List[TrackedObject], target_from_tracking: Optional[np.n
     covariances = both @ np.array([track.covariance for track in tracks]) @ both.T
     predictions_m = np.array([track.prediction_m for track in tracks]) @ rotation.T + shift_m
     predictions_m2 = rotation @ np.array([track.prediction_covariance_m2 for track in tracks]) @ rotation.T
-    return [track._replace(position_m=position_m, velocity_mps=velocity_mps, instant_velocity_mps=velocity_mps,
-                           covariance=covariance, prediction_m=prediction_m, prediction_covariance_m2=prediction_m2)
+    return [track._replace(position_m=position_m, velocity_mps=velocity_mps, covariance=covariance,
+                           prediction_m=prediction_m, prediction_covariance_m2=prediction_m2)
             for track, position_m, velocity_mps, covariance, prediction_m, prediction_m2
             in zip(tracks, positions_m, velocities_mps, covariances, predictions_m, predictions_m2)]

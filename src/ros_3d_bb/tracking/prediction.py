@@ -104,7 +104,7 @@ def published(tracks: Sequence[Track], params: PredictionParams, moving_speed: f
     covariances = numbers.take(COVARIANCES, axis=1)
     ahead = (covariances[:, 36:63] + covariances[:, 63:]).reshape(-1, 3, 9)
     predictions_m2 = powers @ ahead + densities[:, None, None] * spread
-    return [TrackedObject(track.id, position_m, size_m, velocity_mps, velocity_mps, track.status,
+    return [TrackedObject(track.id, position_m, size_m, velocity_mps, track.status,
                           track.is_moving and math.hypot(track.state.u, track.state.v) >= STILL_MOVING * moving_speed,
                           track.first_ns, track.last_ns, prediction_m, params.prediction_step, covariance,
                           prediction_m2, track.kind.label, track.score, track.detection)

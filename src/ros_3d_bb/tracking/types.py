@@ -119,7 +119,6 @@ class CameraView(NamedTuple):
 class TrackedObject(NamedTuple):
     """State of one tracked object after an image.
 
-    `velocity_mps` (3,) is filtered; `instant_velocity_mps` (3,) is measured between the last two detections and noisy.
     `prediction_m` (steps, 3) holds the positions after 1, 2, 3, ... times `prediction_step_s`. Stamps are nanoseconds.
     `covariance` (6, 6) is that of x, y, z and their velocities; `prediction_covariance_m2` (steps, 3, 3) that of the
     predicted positions. Both are None for trackers that do not estimate them. `label` is the class name, `score` the
@@ -130,7 +129,6 @@ class TrackedObject(NamedTuple):
     position_m: np.ndarray
     size_m: np.ndarray
     velocity_mps: np.ndarray
-    instant_velocity_mps: np.ndarray
     status: int
     moving: bool
     first_seen_ns: int

@@ -160,7 +160,7 @@ class MarkerWriter(object):
                      pose=Pose(_point(x, y, z + (float(track.size_m[2]) / 2 + 0.2)), UPRIGHT))
 
     def _velocity(self, track):
-        return _arrow(track, VELOCITY_SHOWN_S * track.instant_velocity_mps, RED, VELOCITY_SCALE)
+        return _arrow(track, VELOCITY_SHOWN_S * track.velocity_mps, RED, VELOCITY_SCALE)
 
     def _prediction(self, track):
         if not len(track.prediction_m):

@@ -175,7 +175,7 @@ class Simulator(object):
         if pushed_m.any():
             paths += pushed_m[:, None]
         start_ns = stamp_ns - int(round(frame.time_s * NS))
-        return [TrackedObject(person.id, person.position_m, person.size_m, person.velocity_mps, person.velocity_mps,
+        return [TrackedObject(person.id, person.position_m, person.size_m, person.velocity_mps,
                               _status(person), bool(np.linalg.norm(person.velocity_mps) > MOVING_MPS), start_ns,
                               stamp_ns, np.c_[path, np.full(len(path), person.position_m[2])], PREDICTION_STEP_S,
                               label=person.label)

@@ -68,7 +68,7 @@ class Norfair(object):
         velocity_mps = np.append(thing.filter.x[2:4].ravel() * self._settings.rate_hz, 0)
         times_s = prediction_times_s(PREDICTION_TIME_S, PREDICTION_STEP_S)
         is_detected = last_ns == self._now_ns
-        return TrackedObject(thing.id, position_m, detection.size_m, velocity_mps, velocity_mps,
+        return TrackedObject(thing.id, position_m, detection.size_m, velocity_mps,
                              VISIBLE if is_detected else OCCLUDED,
                              bool(np.linalg.norm(velocity_mps) >= MOVING_MPS), first_ns, last_ns,
                              position_m + times_s[:, np.newaxis] * velocity_mps, PREDICTION_STEP_S,

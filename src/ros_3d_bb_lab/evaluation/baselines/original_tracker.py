@@ -115,9 +115,8 @@ class OriginalTracker(object):
             self._tracks.remove(track)
 
     def _published(self, track):
-        velocity_mps = track.velocity_mps
         times_s = PREDICTION_STEP_S * np.arange(1, PREDICTIONS + 1)
-        return TrackedObject(track.id, track.position_m, track.size_m, velocity_mps, track.step_m * self._rate_hz,
+        return TrackedObject(track.id, track.position_m, track.size_m, track.velocity_mps,
                              VISIBLE if track.seen_ns == self._now_ns else OCCLUDED,
-                             bool(np.linalg.norm(velocity_mps) >= MOVING_MPS), track.first_ns, track.seen_ns,
-                             track.position_m + times_s[:, np.newaxis] * velocity_mps, PREDICTION_STEP_S)
+                             bool(np.linalg.norm(track.velocity_mps) >= MOVING_MPS), track.first_ns, track.seen_ns,
+                             track.position_m + times_s[:, np.newaxis] * track.velocity_mps, PREDICTION_STEP_S)

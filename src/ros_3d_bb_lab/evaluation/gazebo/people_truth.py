@@ -43,7 +43,7 @@ class PeopleTruth(object):
         future_m = np.array([self.positions_at(time_s + ahead_s)
                              for ahead_s in prediction_times_s(PREDICTION_S, PREDICTION_STEP_S)])
         return [TrackedObject(number + 1, np.append(position_m, SIZE_M[2] / 2), SIZE_M, np.append(velocity_mps, 0),
-                              np.append(velocity_mps, 0), status, bool(np.hypot(*velocity_mps) > MOVING_MPS), stamp_ns,
+                              status, bool(np.hypot(*velocity_mps) > MOVING_MPS), stamp_ns,
                               stamp_ns, np.c_[path_m, np.full(len(path_m), SIZE_M[2] / 2)], PREDICTION_STEP_S)
                 for number, (position_m, velocity_mps, status, path_m) in enumerate(zip(
                     positions_m, velocities_mps, statuses(positions_m, view), future_m.transpose(1, 0, 2)))]
