@@ -57,19 +57,6 @@ class Rules(NamedTuple):
                    _logit(params.confirmation_probability), params.moving_speed, kinds)
 
 
-class LatestBox(NamedTuple):
-    """Position of the latest detection, and whether it was nearer than the track by the offset of outliers."""
-
-    x: float
-    y: float
-    is_nearer: bool
-
-    @classmethod
-    def of(cls, measurement: Measurement) -> 'LatestBox':
-        """The LatestBox of a Measurement."""
-        return cls(measurement.x, measurement.y, measurement.is_nearer)
-
-
 class Track(object):
     """One object. Plain numbers in the fixed frame, metres, nanoseconds.
 
@@ -77,12 +64,12 @@ class Track(object):
     extents; `lower_hits` and `upper_hits` count the detections that show the ends of the body. `hits` counts the
     detections, of which `first_ns` and `last_ns` are the first and the latest. `unseen_s` is the time since the latest
     one. `visibility` is that in the latest image of each camera: SEEN, PRESENT, STAYED, or as `status`; since the
-    stamps `since_ns`. `latest` is the `LatestBox`, and `log_odds` is the track score. `kind` is the class of the group
-    that has the most of the filtered scores `votes`; `score` is the filtered score of the detections, `detection` the
-    `Detection.index` in the latest image. `innovation_m` is that of the latest image if its noise is assumed, otherwise
-    0. `slow_mps` is the velocity, filtered over `SLOW_S`. `misplaced` are the log odds that outliers have moved this
-    track. `is_moving` is whether it moved at the latest detection. `appearance` is the `Appearance`, None if unknown,
-    and `met` are the IDs of the tracks that were detected in an image together with this one.
+    stamps `since_ns`. `latest` is the latest Measurement, and `log_odds` is the track score. `kind` is the class of the
+    group that has the most of the filtered scores `votes`; `score` is the filtered score of the detections, `detection`
+    the `Detection.index` in the latest image. `innovation_m` is that of the latest image if its noise is assumed,
+    otherwise 0. `slow_mps` is the velocity, filtered over `SLOW_S`. `misplaced` are the log odds that outliers have
+    moved this track. `is_moving` is whether it moved at the latest detection. `appearance` is the `Appearance`, None if
+    unknown, and `met` are the IDs of the tracks that were detected in an image together with this one.
     """
 
     def __init__(self, track_id: int, measurement: Measurement, stamp_ns: int, camera: str, speed_mps: float,
@@ -97,7 +84,7 @@ class Track(object):
         self.z_m, self.z_m2, self.size_m = measurement.z, measurement.zz, measurement.size_m
         _left, top, _right, bottom = detection.truncated_edges
         self.lower_hits, self.upper_hits = int(not bottom), int(not top)
-        self.latest = LatestBox.of(measurement)
+        self.latest = measurement
         self.hits, self.first_ns, self.last_ns, self.unseen_s = 1, stamp_ns, stamp_ns, 0.0
         self.status, self.innovation_m = VISIBLE, (0.0, 0.0)
         self.visibility, self.since_ns = {camera: SEEN}, {camera: stamp_ns}
@@ -127,7 +114,7 @@ class Track(object):
         self.set_visibility(camera, SEEN, stamp_ns)
         elapsed_s = (stamp_ns - self.last_ns) / NS
         period_s, share = elapsed_s - self.unseen_s, max(1 - math.exp(-elapsed_s / SLOW_S), 1 / self.hits)
-        latest, self.latest = self.latest, LatestBox.of(measurement)
+        latest, self.latest = self.latest, measurement
         measurement = self._in_place(measurement, latest, period_s, rules.outliers)
         detection, state = measurement.detection, self.state
         is_assumed = measurement.is_assumed
@@ -149,7 +136,7 @@ class Track(object):
         self._update_class(measurement.kind, detection.score, rules.kinds)
         self._update_appearance(detection)
 
-    def _in_place(self, measurement: Measurement, latest: LatestBox, period_s: float,
+    def _in_place(self, measurement: Measurement, latest: Measurement, period_s: float,
                   outliers: kalman_filter.OutlierModel) -> Measurement:
         """Resolve a measurement that is nearer than this track by the offset of outliers. Returns the one to use.
 
