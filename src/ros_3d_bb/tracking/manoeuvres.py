@@ -14,7 +14,7 @@ from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.tracking.association import height_cost
 from ros_3d_bb.tracking.kalman_filter import State, faster
 from ros_3d_bb.tracking.measurement_model import Measurement
-from ros_3d_bb.tracking.track import HIT_CORRELATION_S, Track
+from ros_3d_bb.tracking.track import Track
 
 # All are chosen; `./run bench tracking --rates` shows the effect of others.
 RUNNING_MPS = 6.0  # of tentative tracks, whose velocity is unknown: people run no faster indoors
@@ -31,9 +31,8 @@ def match_manoeuvres(tracks: Sequence[Track], measurements: Sequence[Measurement
     """The pairs (Track, Measurement) outside of the gate that have no other candidates.
 
     `matches` are those of the association, `latest_ns` is the stamp of the latest image of the camera. The velocities
-    of the tracks become as uncertain as their motion to the measurement. Unless this is nearer to the prediction, as of
-    people who bend while they walk, the motion starts at rest at the latest box: a wrong velocity must not lead away
-    from boxes that agree. At high rates, both boxes may be outliers.
+    of the tracks become as uncertain as their motion to the measurement. Unless this is nearer to the prediction, the
+    motion starts at rest at the latest box: a wrong velocity must not lead away from boxes that agree.
     """
     earliest_ns = max(min(latest_ns, stamp_ns - RECENT_NS), stamp_ns - LONGEST_NS)
     seen = [track for track in tracks if earliest_ns <= track.last_ns < stamp_ns]
@@ -62,12 +61,11 @@ def match_manoeuvres(tracks: Sequence[Track], measurements: Sequence[Measurement
 
 def _released(track: Track, measurement: Measurement, elapsed_s: float) -> State:
     """The State of a track whose velocity is as uncertain as its motion to a measurement."""
-    state, shift_m = track.state, _distance_m(track.latest, measurement)
-    if elapsed_s >= HIT_CORRELATION_S:
-        if _distance_m(state, measurement) >= shift_m:
-            state = state._replace(x=track.latest.x, y=track.latest.y, u=0.0, v=0.0)
-        shift_m = _distance_m(state, measurement)
-    return faster(state, elapsed_s, (max(shift_m - BESIDE_M, 0) / elapsed_s) ** 2)
+    state = track.state
+    if _distance_m(state, measurement) >= _distance_m(track.latest, measurement):
+        state = state._replace(x=track.latest.x, y=track.latest.y, u=0.0, v=0.0)
+    shift_m = max(_distance_m(state, measurement) - BESIDE_M, 0)
+    return faster(state, elapsed_s, (shift_m / elapsed_s) ** 2)
 
 
 def _distance_m(place: Any, box: Any) -> float:
