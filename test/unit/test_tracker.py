@@ -205,11 +205,6 @@ def test_boxes_of_a_far_person_with_large_errors_continue_the_track():
     assert len(all_ids(walk)) == 1
 
 
-def cut_by(cut, visible_height, bottom=0.0):
-    """A box truncated by the border, with a part of the height."""
-    return at(2, 0, visible_height, cut, position_m=np.array([2.0, 0, visible_height / 2 + bottom]))
-
-
 @pytest.mark.slow
 def test_moving_has_hysteresis():
     """It starts at 0.2 m/s and ends at 0.1 m/s."""
@@ -292,7 +287,7 @@ def test_the_height_of_a_person_whose_legs_are_hidden_is_that_of_the_person(firs
 def test_the_height_of_a_person_is_constant_on_a_slope(slope, cut, height):
     """The person goes up or down at 1 m/s, 2 m ahead of the robot; the border cuts the box from 1 s to 6 s."""
     def walk(time_s):
-        box = cut_by(cut, height) if 1 < time_s < 6 else at(2, 0)
+        box = at(2, 0, height, cut) if 1 < time_s < 6 else at(2, 0)
         return [box._replace(position_m=box.position_m + (time_s, 0, slope * time_s))]
     published = play(Tracker(), 8, walk, view=lambda time_s: view_from(time_s, 0, 1 + slope * time_s))
     assert set(ids(objects)[0] for objects in published[4:]) == {1}

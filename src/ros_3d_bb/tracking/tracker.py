@@ -27,7 +27,6 @@ from ros_3d_bb.tracking.prediction import PredictionParams, learned_prediction, 
 from ros_3d_bb.tracking.track import MIN_TRACK_SCORE, Rules, Track
 from ros_3d_bb.tracking.types import VISIBLE, CameraView, Detection, TrackedObject, check_steps
 
-KNOWN_NS = 60 * NS  # a camera without images for longer than this, while others send images, counts as new; chosen
 MAX_POSITION_STD_M = 2.4  # tracks whose position is less certain are dropped; chosen
 TENTATIVE_TIMEOUT_S = 0.75  # how long a tentative track is kept without a detection; chosen
 BY_ID, FIRST_SEEN, BY_STAMP = (operator.attrgetter(name) for name in ('id', 'first_ns', 'stamp_ns'))
@@ -245,9 +244,7 @@ class Tracker(object):
         latest, range_m = before.cameras.get(image.view.camera), self._detector.max_range_m
         if range_m is None:
             range_m = learned_range(latest.range_m if latest else DEFAULT_RANGE_M, matches)
-        cameras = {name: known for name, known in before.cameras.items() if image.stamp_ns - known.stamp_ns <= KNOWN_NS}
-        cameras[image.view.camera] = CameraState(image.stamp_ns, image.view, range_m)
-        return cameras
+        return dict(before.cameras, **{image.view.camera: CameraState(image.stamp_ns, image.view, range_m)})
 
     def _delete(self, tracks: Sequence[Track], stamp_ns: int) -> Tuple[List[Track], List[Track]]:
         """The tracks that are kept (tentative ones for a short time only), and the tracks that end."""
