@@ -43,13 +43,11 @@ def associate(tracks: Sequence[Track], measurements: Sequence[Measurement], dete
     (Track, Measurement).
     """
     matches = []
-    ranks: Dict[bool, Costs] = {True: {}, False: {}}
     taken: Set[int] = set()
-    costs, nearer = allowed_costs(tracks, measurements, detection_log_odds, params, outliers)
-    for pair, cost in costs.items():
-        ranks[tracks[pair[0]].is_confirmed][pair] = cost
+    allowed, nearer = allowed_costs(tracks, measurements, detection_log_odds, params, outliers)
     for is_confirmed in (True, False):
-        costs = {pair: cost for pair, cost in ranks[is_confirmed].items() if pair[1] not in taken}
+        costs = {pair: cost for pair, cost in allowed.items()
+                 if tracks[pair[0]].is_confirmed == is_confirmed and pair[1] not in taken}
         for row, column in costs if len(costs) == 1 else _assigned(costs):
             track, measurement = tracks[row], measurements[column]
             matches.append((track, measurement._replace(is_nearer=True) if (row, column) in nearer else measurement))
