@@ -89,7 +89,7 @@ def test_tracks_are_the_same_anywhere_on_the_map(seed, x_m, y_m, yaw_deg):
             detections = [at(x, y, covariance_m2=None) for x, y, _z in transform_points(transform, centers_m)]
             view = CameraView(transform.dot(mounted(1.0)), CAMERA)
             tracks.append(tracker.update(START_NS + image * PERIOD_NS, detections, view))
-        assert [track[:1] + track[5:9] for track in tracks[0]] == [track[:1] + track[5:9] for track in tracks[1]]
+        assert [track[:1] + track[4:8] for track in tracks[0]] == [track[:1] + track[4:8] for track in tracks[1]]
         for here, there in zip(*tracks):
             np.testing.assert_allclose(transform_points(moved, here.position_m), there.position_m, atol=1e-6, rtol=0)
             np.testing.assert_allclose(moved[:3, :3].dot(here.velocity_mps), there.velocity_mps, atol=1e-6)
