@@ -67,6 +67,11 @@ class Input(object):
         if is_last:
             self.subscriber.unregister()
 
+    @property
+    def is_connected(self):
+        """Whether a publisher is connected. The count of rospy 1.15 and earlier includes connections that have ended."""
+        return any(not connection.done for connection in self.subscriber.impl.connections)
+
     def stream(self):
         """Return the statistics as a Stream. Lags are unknown without a stamp, and before the first /clock message."""
         stamp, ros_time, machine_s = self._newest or (None, None, None)
@@ -139,9 +144,9 @@ class InputMonitor(object):
             yield 'no clock', '%s; %s' % NO_CLOCK
             return
         for each in inputs():
-            if each.is_irregular and (each.count or each.subscriber.get_num_connections()):
+            if each.is_irregular and (each.count or each.is_connected):
                 continue
-            if each.kind is CameraInfo and each.count and each.subscriber.get_num_connections():
+            if each.kind is CameraInfo and each.count and each.is_connected:
                 continue  # one is valid for all images
             silent_s = now_s - (each.received_s or self._began_s)
             if silent_s > SILENT_S:
