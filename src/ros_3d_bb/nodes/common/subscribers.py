@@ -69,8 +69,8 @@ class Input(object):
 
     @property
     def is_connected(self):
-        """Whether a publisher is connected. The count of rospy 1.15 and earlier includes connections that have ended."""
-        return any(not connection.done for connection in self.subscriber.impl.connections)
+        """Whether a publisher is connected. The count of rospy 1.15 includes publishers that it tries to reach again."""
+        return any(connection.socket is not None for connection in self.subscriber.impl.connections)
 
     def stream(self):
         """Return the statistics as a Stream. Lags are unknown without a stamp, and before the first /clock message."""
