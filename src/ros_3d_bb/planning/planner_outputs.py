@@ -39,8 +39,7 @@ class Output(NamedTuple):
 
 
 # Outputs whose message type, given by name, is defined in a package that may not be installed. `write` takes tracks in
-# the output frame, the header and the `msg` module of the package. `frame` is the name of a parameter of
-# PlannerBridgeParams, or empty.
+# the output frame, the header and the `msg` module of the package. `frame` is the name of a parameter.
 OPTIONAL = {
     'people': Output('/people', 'people_msgs/People', people_to_msg, to_now=True, latest_tf=True),
     'teb': Output('~obstacles', 'costmap_converter/ObstacleArrayMsg', obstacles_to_msg, 'planner_frame', to_now=True,

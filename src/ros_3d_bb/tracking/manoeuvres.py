@@ -69,5 +69,4 @@ def _released(track: Track, measurement: Measurement, elapsed_s: float) -> State
 
 
 def _distance_m(place: Any, box: Any) -> float:
-    """Distance of a box from a place in the plane."""
     return math.hypot(box.x - place.x, box.y - place.y)
