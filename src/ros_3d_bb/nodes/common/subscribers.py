@@ -69,7 +69,7 @@ class Input(object):
 
     @property
     def is_connected(self):
-        """Whether a publisher is connected. The count of rospy 1.15 includes publishers that it tries to reach again."""
+        """Whether a publisher is connected. The count of rospy 1.15 includes those that it tries to reach again."""
         return any(connection.socket is not None for connection in self.subscriber.impl.connections)
 
     def stream(self):
