@@ -66,7 +66,7 @@ def test_what_is_published_once_is_no_silent_input(subscribe, kind, before, coun
     with mock.patch('rospy.Subscriber') as subscriber, mock.patch.object(subscribers, '_inputs', []) as inputs, \
             mock.patch.object(subscribers, '_cause_of_silence', return_value='silent'), \
             mock.patch('rospy.get_rostime', lambda: rospy.Time(1000)):
-        subscriber().get_num_connections.return_value = 1
+        subscriber().impl.connections = [mock.Mock()]
         subscribe()
         monitor = subscribers.InputMonitor()
         monitor._began_s = -100.0
@@ -75,7 +75,7 @@ def test_what_is_published_once_is_no_silent_input(subscribe, kind, before, coun
         assert not list(monitor.faults())
         inputs[0].received_s = -100.0
         assert not list(monitor.faults())
-        inputs[0].count, subscriber().get_num_connections.return_value = count, 0
+        inputs[0].count, subscriber().impl.connections[0].socket = count, None  # as rospy 1.15
         assert list(monitor.faults()) == [('silence on once', 'silent')]
 
 
