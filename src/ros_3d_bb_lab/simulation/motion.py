@@ -3,6 +3,7 @@
 A motion is linear between knots. The state at a time is the mean over an interval of `SMOOTHING_S` around it, so that
 velocity and heading do not jump. Convention: map frame, metres, radians, seconds.
 """
+import bisect
 from typing import NamedTuple
 
 import numpy as np
@@ -34,11 +35,12 @@ class Motion(object):
     """
 
     def __init__(self, times_s, values):
-        self._times_s, self._values = np.asarray(times_s, float), np.asarray(values, float)
+        self._times_s, self._values = list(times_s), np.asarray(values, float)
         steps_s = np.diff(self._times_s)[:, None]
         means = (self._values[1:] + self._values[:-1]) / 2
         self._integrals = np.concatenate([np.zeros((1, len(COLUMNS))), np.cumsum(steps_s * means, axis=0)])
-        self._slopes = np.diff(self._values, axis=0) / np.where(steps_s > 0, steps_s, 1)
+        slopes = np.diff(self._values, axis=0) / np.where(steps_s > 0, steps_s, 1)
+        self._slopes = np.concatenate([slopes, np.zeros((1, len(COLUMNS)))])  # nothing moves after the last knot
 
     def at(self, time_s):
         """State at a time since the start. Before the first and after the last knot nothing moves."""
@@ -49,12 +51,11 @@ class Motion(object):
                      Posture(float(mean[PHASE]), float(mean[SWING]), float(mean[CROUCH])))
 
     def _evaluated(self, time_s):
-        knot = int(np.clip(np.searchsorted(self._times_s, time_s, side='right') - 1, 0, len(self._times_s) - 1))
+        interval = bisect.bisect_right(self._times_s, time_s) - 1  # -1: before the first knot, as after the last one
+        knot = max(interval, 0)
         beyond_s = time_s - self._times_s[knot]
-        outside = knot == len(self._times_s) - 1 or beyond_s < 0
-        slope = np.zeros(len(COLUMNS)) if outside else self._slopes[knot]
-        value, integral = self._values[knot], self._integrals[knot]
-        return value + slope * beyond_s, integral + beyond_s * (value + slope * beyond_s / 2)
+        moved = self._slopes[interval] * beyond_s
+        return self._values[knot] + moved, self._integrals[knot] + beyond_s * (self._values[knot] + moved / 2)
 
 
 def person_motion(person, height_m, duration_s):
