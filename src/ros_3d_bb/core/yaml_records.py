@@ -1,16 +1,17 @@
-"""Records in YAML files: NamedTuples whose fields are numbers, texts, lists of numbers and other records."""
+"""Records in YAML files: NamedTuples whose fields are numbers, flags, texts, other records, and lists of them."""
 import math
-from typing import Any
+from typing import Any, Callable, Sequence, Set, Tuple
 
 import yaml
 
 from ros_3d_bb.core.params import nearest_name
 
-EXPECTED = {float: 'a number', int: 'an integer', str: 'text'}  # types of values
+EXPECTED = {float: 'a number', int: 'an integer', bool: 'true or false', str: 'text'}  # types of values
+Check = Tuple[Set[str], Callable[[Any], bool], str]  # names of fields, whether a value is valid, what is expected
 
 
-def record_from(kind: Any, content: Any, where: str = '') -> Any:
-    """Convert YAML content to a NamedTuple `kind`; `where` is its key.
+def record_from(kind: Any, content: Any, where: str = '', checks: Sequence[Check] = ()) -> Any:
+    """Convert YAML content to a NamedTuple `kind`; `where` is its key. `checks` are of single numbers and texts.
 
     Raises ValueError if a key is unknown (the message names the nearest one), missing, or has an invalid value.
     """
@@ -24,23 +25,37 @@ def record_from(kind: Any, content: Any, where: str = '') -> Any:
     for name in kind._fields:
         if name not in content and name not in kind._field_defaults:
             raise ValueError('the key %s%s is missing' % (prefix, name))
-    return kind(**{name: _value(kind.__annotations__[name], value, prefix + name) for name, value in content.items()})
+    return kind(**{name: _value(kind.__annotations__[name], value, prefix + name, checks)
+                   for name, value in content.items()})
 
 
-def _value(kind: Any, content: Any, where: str) -> Any:
+def _value(kind: Any, content: Any, where: str, checks: Sequence[Check]) -> Any:
     """Convert YAML content to a value of `kind`, the type of a field."""
     inner: Any = getattr(kind, '__args__', None) or ()
     if type(None) in inner:  # Optional
-        return None if content is None else _value(inner[0], content, where)
+        return None if content is None else _value(inner[0], content, where, checks)
     if hasattr(kind, '_fields'):
-        return record_from(kind, content, where)
-    if inner and isinstance(content, list) and content:
-        return tuple(_value(inner[0], value, where) for value in content)
+        return record_from(kind, content, where, checks)
+    if inner:
+        return _list(inner, content, where, checks)
     if kind is float and isinstance(content, int) and not isinstance(content, bool):
         content = float(content)
     if type(content) is not kind or (kind is float and not math.isfinite(content)):
-        raise ValueError('%s is %r; %s expected' % (where, content, EXPECTED.get(kind, 'a list of numbers')))
+        raise ValueError('%s is %r; %s expected' % (where, content, EXPECTED[kind]))
+    for names, is_valid, expected in checks:
+        if where.rpartition('.')[2] in names and not is_valid(content):
+            raise ValueError('%s is %r; %s expected' % (where, content, expected))
     return content
+
+
+def _list(inner: Any, content: Any, where: str, checks: Sequence[Check]) -> Any:
+    """Convert a list to a tuple. `inner` are the types in its brackets. Only a list of records may be empty."""
+    has_records, count = hasattr(inner[0], '_fields'), None if inner[-1] is Ellipsis else len(inner)
+    if not isinstance(content, list) or (count or len(content)) != len(content) or not (content or has_records):
+        raise ValueError('%s is %r; %s expected' % (
+            where, content, '%d numbers' % count if count else 'a list' if has_records else 'a list of numbers'))
+    return tuple(_value(inner[0], entry, '%s[%d]' % (where, number) if has_records else where, checks)
+                 for number, entry in enumerate(content, 1))
 
 
 def record_text(record: Any) -> str:

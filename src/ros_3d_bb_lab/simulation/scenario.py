@@ -9,8 +9,8 @@ from typing import NamedTuple, Optional, Tuple
 import yaml
 
 from ros_3d_bb.core.object_classes import label_fault
-from ros_3d_bb.core.params import nearest_name
 from ros_3d_bb.core.yaml_loader import load_yaml
+from ros_3d_bb.core.yaml_records import record_from
 from ros_3d_bb_lab.simulation.scene_objects import SHAPES
 
 Color = Tuple[int, int, int]
@@ -137,20 +137,11 @@ class Scenario(NamedTuple):
 
 
 MOVE_KEYS = {'to': ('to', 'speed', 'rate'), 'turn': ('turn', 'rate'), 'wait': ('wait', 'facing', 'crouch')}
-RECORDS = {'room': Room, 'robot': Robot, 'follow': Follow, 'drive': Drive}
-LISTS = {'furniture': Furniture, 'people': Person, 'objects': SceneObject, 'moves': Move, 'cameras': Mount}
-VECTORS = {'bounds': 4, 'at': 2, 'size': 3, 'to': 2, 'start': 2, 'pose': 3, 'mount': 3, 'odometry_drift': 3,
-           'footprint': 2, 'odometry_error': 2, 'color': 3}
-FLAGS = {'repeat', 'gives_way', 'depth_noise'}
-WHOLE = {'seed', 'person', 'pushed_by'}
 NAME = re.compile(r'[A-Za-z]\w*$')  # a topic namespace
-TYPES = (  # keys, check of a value, and its description
-    (LISTS, lambda value: isinstance(value, list), 'a list'),
-    (FLAGS, lambda value: isinstance(value, bool), 'true or false'),
-    ({'name'}, lambda value: isinstance(value, str) and NAME.match(value), 'a name such as front'),
-    ({'label'}, lambda value: isinstance(value, str) and not label_fault(value), 'the name of a class such as dog'))
-RANGES = (  # the same for numbers
-    (WHOLE, lambda number: number == int(number) and 0 <= number < 2 ** 32, 'an integer from 0 to 4294967295'),
+CHECKS = (  # keys, check of a value, and its description
+    ({'name'}, NAME.match, 'a name such as front'),
+    ({'label'}, lambda label: not label_fault(label), 'the name of a class such as dog'),
+    ({'seed', 'person', 'pushed_by'}, lambda number: 0 <= number < 2 ** 32, 'an integer from 0 to 4294967295'),
     ({'duration', 'rate', 'height', 'speed', 'distance', 'size', 'footprint', 'acceleration', 'angular_acceleration'},
      lambda number: number > 0, 'more than 0'),
     ({'odometry_error'}, lambda number: -1 < number < 1, 'more than -1 and less than 1'),
@@ -186,15 +177,15 @@ def _load(path):
 
 def scenario_from(content):
     """Convert the content of a scenario file to a Scenario. Raises ValueError."""
-    scenario = _record(Scenario, content, 'scenario')
+    scenario = record_from(Scenario, content, 'scenario', CHECKS)
     room, robot = scenario.room, scenario.robot
     if not (room.bounds[0] < room.bounds[1] and room.bounds[2] < room.bounds[3]):
         raise ValueError('room.bounds is %s; x0 < x1 and y0 < y1 expected' % (list(room.bounds),))
     # The cameras must stay inside the room at any heading of the robot.
     camera_m = max(sum(abs(part) for part in camera.mount[:2]) for camera in robot.mounts)
-    _check_inside(room.bounds, 'robot', robot.pose[:2], robot.moves, camera_m)
+    _check_path(room.bounds, 'robot', robot.pose[:2], robot.moves, camera_m)
     for number, person in enumerate(scenario.people, 1):
-        _check_inside(room.bounds, 'people[%d]' % number, person.start, person.moves)
+        _check_path(room.bounds, 'people[%d]' % number, person.start, person.moves)
     for number, scene_object in enumerate(scenario.objects, 1):
         _check_object(scene_object, 'objects[%d]' % number, scenario)
     _check_cameras(robot, room)
@@ -205,8 +196,9 @@ def scenario_from(content):
 
 def with_overrides(scenario, rate=None, seed=None):
     """Replace the rate and the seed of a scenario unless they are None. Raises ValueError if one is invalid."""
-    given = {name: _value(name, value, name) for name, value in (('rate', rate), ('seed', seed)) if value is not None}
-    return scenario._replace(**given)
+    given = {name: value for name, value in (('rate', rate), ('seed', seed)) if value is not None}
+    checked = record_from(Scenario, given, checks=CHECKS)
+    return scenario._replace(**{name: getattr(checked, name) for name in given})
 
 
 def _check_cameras(robot, room):
@@ -225,7 +217,7 @@ def _check_object(scene_object, name, scenario):
     if (scene_object.start is None) == (scene_object.pushed_by is None):
         raise ValueError('%s is a %s; either start or pushed_by expected' % (name, scene_object.label))
     if scene_object.start is not None:
-        _check_inside(scenario.room.bounds, name, scene_object.start, scene_object.moves)
+        _check_path(scenario.room.bounds, name, scene_object.start, scene_object.moves)
     elif not 1 <= scene_object.pushed_by <= len(scenario.people):
         raise ValueError('%s.pushed_by is %d; 1 to %d expected' % (name, scene_object.pushed_by, len(scenario.people)))
     elif scene_object.moves:
@@ -235,64 +227,20 @@ def _check_object(scene_object, name, scenario):
                          % (name, scene_object.label, ', '.join(sorted(SHAPES))))
 
 
-def _check_inside(bounds, name, start, moves, margin_m=0.0):
+def _check_path(bounds, name, start, moves, margin_m=0.0):
+    for number, move in enumerate(moves, 1):
+        _check_move(move, '%s.moves[%d]' % (name, number))
     x0, x1, y0, y1 = bounds = [bound + sign * margin_m for bound, sign in zip(bounds, (1, -1, 1, -1))]
     for x, y in [start] + [move.to for move in moves if move.to is not None]:
         if not (x0 < x < x1 and y0 < y < y1):
             raise ValueError('%s is at (%g, %g), outside the room %s' % (name, x, y, bounds))
 
 
-def _record(kind, given, where):
-    if not isinstance(given, dict):
-        raise ValueError('%s is %r; a mapping expected' % (where, given))
-    for name in given:
-        if name not in kind._fields:
-            raise ValueError('%s has the unknown key %r; did you mean %s? Known keys: %s'
-                             % (where, name, nearest_name(str(name), kind._fields), ', '.join(kind._fields)))
-    try:
-        record = kind(**{name: _value(name, value, '%s.%s' % (where, name)) for name, value in given.items()})
-    except TypeError:
-        required = [name for name in kind._fields if name not in kind._field_defaults]
-        raise ValueError('%s has the keys %s; %s expected, too' % (
-            where, list(given), ', '.join(name for name in required if name not in given)))
-    if kind is Move:
-        _check_move(given, where)
-    return record
-
-
-def _check_move(given, where):
-    verbs = [name for name in MOVE_KEYS if given.get(name) is not None]
+def _check_move(move, name):
+    verbs = [verb for verb in MOVE_KEYS if getattr(move, verb) is not None]
     if len(verbs) != 1:
-        raise ValueError('%s is %s; exactly one of to, turn, wait expected' % (where, given))
-    for name in given:
-        if name not in MOVE_KEYS[verbs[0]]:
-            raise ValueError('%s is %s; %s is only allowed with %s'
-                             % (where, given, name, ' or '.join(v for v in MOVE_KEYS if name in MOVE_KEYS[v])))
-
-
-def _value(name, value, where):
-    _check(TYPES, name, value, where)
-    if name in RECORDS:
-        return _record(RECORDS[name], value, where)
-    if name in LISTS:
-        return tuple(_record(LISTS[name], entry, '%s[%d]' % (where, number)) for number, entry in enumerate(value, 1))
-    if name in VECTORS:
-        if not (isinstance(value, list) and len(value) == VECTORS[name]):
-            raise ValueError('%s is %r; %d numbers expected' % (where, value, VECTORS[name]))
-        return tuple(_number(name, entry, where) for entry in value)
-    if name in FLAGS or name in ('name', 'label'):
-        return value
-    return _number(name, value, where)
-
-
-def _check(checks, name, value, where):
-    for names, is_valid, expected in checks:
-        if name in names and not is_valid(value):
-            raise ValueError('%s is %r; %s expected' % (where, value, expected))
-
-
-def _number(name, value, where):
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e10:
-        raise ValueError('%s is %r; a number expected' % (where, value))
-    _check(RANGES, name, value, where)
-    return int(value) if name in WHOLE else float(value)
+        raise ValueError('%s has %s; exactly one of to, turn, wait expected' % (name, ' and '.join(verbs) or 'none'))
+    for key in Move._fields:
+        if getattr(move, key) != Move._field_defaults[key] and key not in MOVE_KEYS[verbs[0]]:
+            raise ValueError('%s has %s and %s, which is only allowed with %s'
+                             % (name, verbs[0], key, ' or '.join(verb for verb in MOVE_KEYS if key in MOVE_KEYS[verb])))
