@@ -39,7 +39,8 @@ STATUS = {VISIBLE: OCCLUDED, OCCLUDED: OCCLUDED, OUT_OF_VIEW: OUT_OF_VIEW, PRESE
           STAYED: OCCLUDED, SEEN: VISIBLE}
 RECENT_NS = NS  # a camera whose latest image is older is ignored
 BEHIND_M = 0.45  # upper bound of the position's standard deviation of a person who stays behind an occluder
-PRESENT_M = 0.3  # the same of one whose place is occupied
+PRESENT_M = 0.3  # the same of one whose place is occupied, and of one who stands there: within 10 s, people who wait
+STANDING_M = 0.1  # move by 0.06 m along each axis (RMS, the VRU Trajectory Dataset), beside the error of the position
 STOPPING_S = 0.5  # time constant of the velocity of a person who does not come as near as predicted
 PRESENT_NS = 30 * NS  # without a detection for longer, what occupies the place may be a wall, which never leaves
 # Distance of the tracks of one person in two places, and time for which each is missed by one camera; chosen.
@@ -68,7 +69,7 @@ def mark_missed(missed: Sequence[Track], tracks: Iterable[Track], before: Iterab
     An occluded person who is predicted to reappear but is not detected is assumed to stay behind the occluder: the
     track keeps its previous position. A person whose place is occupied does not become less certain than `PRESENT_M`,
     until `PRESENT_NS` after the latest detection, and does not come nearer than what occupies it; who stands stays
-    there. A person who walks up to a camera stops before it, as people do in front of a robot.
+    there, with `STANDING_M`. A person who walks up to a camera stops before it, as people do in front of a robot.
 
     `missed` are those of the `tracks` that are not detected; they are predicted to the stamp of the image. `before` are
     the tracks after the previous image. `cameras` maps each camera to its CameraState; `camera` is that of the image,
@@ -184,10 +185,9 @@ def _is_empty(view: CameraView, place: State) -> bool:
 
 def _stop(track: Track, former: State, share: float) -> None:
     """Return a track to its former State, with a share of the velocity."""
-    slow_u, slow_v = track.slow_mps
+    (slow_u, slow_v), most_m = track.slow_mps, PRESENT_M if track.is_moving else STANDING_M
     track.slow_mps = share * slow_u, share * slow_v
-    track.state = State(former.x, former.y, share * former.u, share * former.v,
-                        *_bounded(track.state, former, PRESENT_M))
+    track.state = State(former.x, former.y, share * former.u, share * former.v, *_bounded(track.state, former, most_m))
 
 
 def _visibilities(tracks: Sequence[Track], occluding: Sequence[Track], image: CameraState) -> Visibilities:
