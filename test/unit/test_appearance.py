@@ -31,6 +31,8 @@ def test_only_the_person_has_the_colours(hidden_columns):
     assert appearance_of(box._replace(truncated_edges=(False, True, False, False)), color, depth, CAMERA) is None
     nearer = box._replace(center_m=np.array([0, 0, 1.0]))
     assert appearance_of(nearer, color, depth, CAMERA) is None
+    infrared = np.repeat(color[..., :1], 3, axis=2)
+    assert appearance_of(box, infrared, depth, CAMERA) is None
 
 
 def visit(colors, start_s, end_s, y=0.0):

@@ -23,12 +23,15 @@ DARKEST = 8.0  # added to 8-bit colours: those of dark pixels are mostly noise
 
 def appearance_of(box: Box3D, color: np.ndarray, depth: DepthImage, camera: Camera) -> Optional[Tuple[float, ...]]:
     """The appearance of the person in a Box3D, given an RGB image (height, width, 3) and the DepthImage of the same
-    pixels; None if both parts are unknown."""
+    pixels; None if both parts are unknown, and in grey images, as of an infrared camera: to them, all clothes are alike.
+    """
     rows, columns = grid_in(box.rect_px, depth.shape)
     _left, is_head_cut, _right, _bottom = box.truncated_edges
     if is_head_cut or rows.start >= rows.stop or columns.start >= columns.stop:
         return None
     distance_m, color = float(box.center_m[2]), color[rows, columns]
+    if (color == color[..., :1]).all():
+        return None
     with np.errstate(invalid='ignore'):  # nan
         is_person = np.abs(depth.part(rows, columns) * depth.scale_m - distance_m) < BODY_HALF_DEPTH_MM / 1000.0
     below_m = (np.arange(rows.start, rows.stop, rows.step) - box.rect_px[1]) * distance_m / camera.fy
