@@ -38,9 +38,10 @@ def _value(kind: Any, content: Any, where: str, checks: Sequence[Check]) -> Any:
         return record_from(kind, content, where, checks)
     if inner:
         return _list(inner, content, where, checks)
-    if kind is float and isinstance(content, int) and not isinstance(content, bool):
+    is_flag = isinstance(content, bool)  # which is an int, too
+    if kind is float and isinstance(content, int) and not is_flag:
         content = float(content)
-    if type(content) is not kind or (kind is float and not math.isfinite(content)):
+    if not isinstance(content, kind) or is_flag != (kind is bool) or (kind is float and not math.isfinite(content)):
         raise ValueError('%s is %r; %s expected' % (where, content, EXPECTED[kind]))
     for names, is_valid, expected in checks:
         if where.rpartition('.')[2] in names and not is_valid(content):
