@@ -12,7 +12,7 @@ HALF_SIZE_M = 5.0  # of the grid, whose centre is the robot
 HIGHEST = 99  # of an OccupancyGrid; 100 would be lethal
 RISKY = 0.3  # probability, above that at the robot, with the highest cost
 STEP_S, HORIZON_S = 0.1, 2.0
-COMFORT_M = 0.2  # kept free around the body
+COMFORT_M = 0.45  # kept free around the body: the intimate distance of Hall (The Hidden Dimension, 1966), 1.5 feet
 # Share of the standard deviation across the walking direction that counts: later images will reduce it. A robot that
 # does not expect this finds no free way past a person who comes straight on, and stops in the way (Trautman and Krause
 # 2010, the freezing robot problem).
