@@ -13,6 +13,10 @@ from ros_3d_bb.planning.people_removal import scan_points
 from ros_3d_bb.planning.planner_view import covariances_after, position_after
 
 TIME_STEP_S, PATH_STEP_M = 0.05, 0.05
+STANDING_S = 2.0  # the usual time of the predictions
+# At this speed, 17 kg (a Jackal) touch a shin with twice the permanent force that it stands, as ISO/TS 15066 permits for
+# transient contacts: 2 * 130 N / sqrt(60 kN/m * 14 kg), A.3.
+LEAVING_MPS = 0.3
 # Chosen: there is room for a person behind an obstacle whose edge is so much nearer than what is seen beside it, and
 # which is at least so wide. Legs are narrower.
 LEAST_ROOM_M, LEAST_WIDTH_M = 0.5, 0.35
@@ -52,8 +56,11 @@ def highest_safe_speed(tracks, age_s, robot_from_tracks, velocity, params, pose_
     The separation distance of ISO/TS 15066 (5.5.4), with the distance in which the robot stops, v T + v²/2a, on one
     side, and on the other side the free distance along its path to the nearest ellipse in which a person may be at any
     time until the robot stands. The ellipse is the predicted position with `position_sigmas` of its covariance, around
-    which the body, the robot and `people_clearance` are added. A person in whose ellipse the robot already stands does
-    not keep it from leaving.
+    which the body, the robot and `people_clearance` are added.
+
+    A person who will come to the robot does not keep it from leaving at up to `LEAVING_MPS`: if it would be in the
+    ellipse where it stands, within `STANDING_S`, only places count that are nearer to the person, relative to the
+    ellipse, or where the robot would touch the body at its expected position.
 
     The stamp of the tracks (TrackedObject) is `age_s` seconds ago; the latest pose of their frame, (4, 4), is that of
     `pose_age_s` seconds ago, and the robot has moved on since. Of the velocity of the robot, along x, along y and
@@ -61,8 +68,15 @@ def highest_safe_speed(tracks, age_s, robot_from_tracks, velocity, params, pose_
     """
     speed_mps, robot_m = params.highest_speed, np.linalg.inv(robot_from_tracks)[:3, 3]
     for track in sorted(tracks, key=lambda each: np.linalg.norm(each.position_m - robot_m)):  # the nearest limit most
-        distances = functools.partial(_distances_to_person, track, age_s, robot_from_tracks, params)
-        speed_mps = min(speed_mps, _safe_speed(distances, velocity, params, speed_mps, pose_age_s))
+        to_person = functools.partial(_distances_to_person, track, age_s, robot_from_tracks, params)
+        safe_mps = _safe_speed(lambda *moved: to_person(*moved)[0], velocity, params, speed_mps, pose_age_s)
+        if safe_mps < LEAVING_MPS:
+            standing_s = np.arange(0, STANDING_S, TIME_STEP_S)
+            least = to_person(standing_s, np.zeros((1, 2)))[0].min()
+            leaving_mps = _safe_speed(functools.partial(_nearer, to_person, least), velocity, params, LEAVING_MPS,
+                                      pose_age_s)
+            safe_mps = max(safe_mps, min(leaving_mps, LEAVING_MPS))
+        speed_mps = min(speed_mps, safe_mps)
     return speed_mps
 
 
@@ -167,17 +181,25 @@ def _path(velocity, lengths_m):
     return lengths_m[:, np.newaxis] * along.dot([[cos, sin], [-sin, cos]])
 
 
+def _nearer(to_person, least, *moved):
+    """Distances (n, m) that are at most 1 in the ellipse where they are at most `least`, and at the body."""
+    in_ellipse, to_body = to_person(*moved)
+    return np.minimum(in_ellipse / np.clip(least, 1e-9, 1), to_body)
+
+
 def _distances_to_person(track, age_s, robot_from_tracks, params, ahead_s, places_m):
-    """Distances (n, m) of places (m, 2) from the centre of a person at times (n,); 1: on the ellipse."""
+    """Distances (n, m) of places (m, 2) from the centre of a person at times (n,), relative to the ellipse, and to the
+    sum of the radii of robot and body."""
     rotation, robot_m = robot_from_tracks[:2, :2], np.linalg.inv(robot_from_tracks)[:2, 3]
     ahead_s = age_s + ahead_s
     centers_m = (position_after(track, ahead_s)[:, :2] - robot_m).dot(rotation.T)  # also where the robot is tilted
     covariances_m2 = np.matmul(np.matmul(rotation, covariances_after(track, ahead_s)[:, :2, :2]), rotation.T)
     variances_m2, axes = np.linalg.eigh(covariances_m2)
-    radius_m = track.size_m[0] / 2 + params.robot_radius + params.people_clearance
-    semi_axes_m = radius_m + params.position_sigmas * np.sqrt(np.maximum(variances_m2, 0))
+    touching_m = track.size_m[0] / 2 + params.robot_radius
+    semi_axes_m = touching_m + params.people_clearance + params.position_sigmas * np.sqrt(np.maximum(variances_m2, 0))
     offsets_m = np.matmul(places_m - centers_m[:, np.newaxis], axes)
-    return np.linalg.norm(offsets_m / semi_axes_m[:, np.newaxis], axis=2)
+    return (np.linalg.norm(offsets_m / semi_axes_m[:, np.newaxis], axis=2),
+            np.linalg.norm(offsets_m, axis=2) / touching_m)
 
 
 def _distances_to_corner(corner_m, age_s, params, people_mps, ahead_s, places_m):
