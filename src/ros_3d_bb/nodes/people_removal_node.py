@@ -38,8 +38,7 @@ class PeopleRemovalNode(object):
     The outputs are for costmaps, SLAM and localisation, which take people for obstacles that stay. People are where
     their tracks predict them at the time of the measurements, in scans with a time_increment that of each beam, and
     reach the floor. Without tracks for ~timeout or a transform, measurements pass as they are, and so do those of
-    another layout.
-    Parameters: config/people_removal.yaml.
+    another layout. Parameters: config/people_removal.yaml.
 
     Subscribes
     ----------

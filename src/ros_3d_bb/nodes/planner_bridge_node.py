@@ -101,8 +101,7 @@ class PlannerBridgeNode(object):
     """Publish tracks in the message formats of planners.
 
     ~outputs selects the published topics. If no tracks arrive for ~timeout, an empty array is published once on each,
-    except for ~clearing_points.
-    Parameters: config/planner_bridge.yaml.
+    except for ~clearing_points. Parameters: config/planner_bridge.yaml.
 
     Subscribes
     ----------

@@ -141,8 +141,7 @@ def nearer_cost(x: Any, y: Any, xx: Any, xy: Any, yy: Any, ray_x: Any, ray_y: An
 
 def _likely_pairs(tracks: Sequence[Track], measurements: Sequence[Measurement], gates: Sequence[Gate],
                   outliers: OutlierModel) -> Iterable[Tuple[int, int, float, bool]]:
-    """The pairs (row, column, position cost, whether the measurement is nearer) with costs below those of new
-    targets.
+    """The pairs (row, column, position cost, whether the measurement is nearer) with costs below those of new targets.
     """
     pairs = []
     for row, track in enumerate(tracks):

@@ -2,10 +2,9 @@
 
 Scored are the people that are VISIBLE in an image, and all tracks published for it, independent of their status. Tracks
 and people within `PAIRED_M` are matched one to one: as many as possible, with the least sum of distances. A track
-farther than `MATCHED_M` from every person is a false positive, except outside of the scored area of the run, where
-this cannot be decided. TrackEval's similarity falls from 1 at distance 0 to
-0 at `PAIRED_M`; a match requires 0.5, which corresponds to `MATCHED_M`. Errors of velocities, predictions and
-covariances are computed from the matched pairs.
+farther than `MATCHED_M` from every person is a false positive, except outside of the scored area of the run, where this
+cannot be decided. TrackEval's similarity falls from 1 at distance 0 to 0 at `PAIRED_M`; a match requires 0.5, which
+corresponds to `MATCHED_M`. Errors of velocities, predictions and covariances are computed from the matched pairs.
 """
 import contextlib
 import io
