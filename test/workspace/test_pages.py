@@ -264,12 +264,3 @@ def test_launch_files_load_and_document_their_arguments(name):
         inner = os.path.relpath(os.path.realpath(str(value)), ROOT)
         if str(value).startswith(os.sep) and not inner.startswith(os.pardir):
             assert os.path.exists(inside(inner)) and inner.split(os.sep)[0] in INSTALLED, value
-
-
-@pytest.mark.parametrize('name, variable', [
-    ('detector', ('OMP_WAIT_POLICY', 'PASSIVE')),  # waiting threads of torch leave the cores to other nodes
-    ('tracker', ('OPENBLAS_NUM_THREADS', '1'))])  # small matrices need no second core
-def test_nodes_use_the_cores_that_they_need(name, variable):
-    """The libraries read the variables when they are loaded."""
-    _parameters, nodes = loaded(name + '.launch', *REQUIRED_ARGUMENTS)
-    assert nodes and all(variable in node.env_args for node in nodes.values())
