@@ -125,6 +125,9 @@ def test_the_search_ends():
     selected(selector, 1, person(1, 2, 0))
     assert selected(selector, 16.5) is None and selector.has_given_up
     assert selected(selector, 17, person(1, 2, 0)) is None
+    without_tracks = TargetSelector()  # or without a pose of the robot
+    selected(without_tracks, 1, person(1, 2, 0))
+    assert selected(without_tracks, 17, person(1, 2, 0)) is None and without_tracks.has_given_up
 
 
 class Drive(object):

@@ -93,8 +93,9 @@ class TargetSelector(object):
             self.target = _chosen(tracks, robot_m, params.track_id)
         if self.target is None or self.has_given_up:
             return None
-        if self.target.id in self._seen and stamp_ns < self._seen[self.target.id].stamp_ns - JUMP_NS:
-            self.has_given_up = True  # the clock went back
+        lost_ns = stamp_ns - self._seen[self.target.id].stamp_ns if self._seen else 0
+        if not -JUMP_NS <= lost_ns <= params.recover_within * NS:  # also if no tracks have arrived, or the clock went back
+            self.has_given_up = True
             return None
         self._update(tracks, stamp_ns, params.recover_within)
         self._check_identity(tracks, stamp_ns)
@@ -102,7 +103,6 @@ class TargetSelector(object):
             self._change_to_nearest(tracks, self._seen[self.target.id], stamp_ns, [])
         self.target, seen_ns, _published_ns = self._seen[self.target.id]
         lost_s = (stamp_ns - seen_ns) / NS
-        self.has_given_up = lost_s > params.recover_within
         if lost_s > params.lost_after:
             return None
         predicted, = predicted_to([self.target], lost_s)
