@@ -29,7 +29,7 @@ def presence_costs(tracks, robot_from_tracks, robot_radius_m):
 
     The probability that a disc of radius r covers a point at the offset d from its expected centre is approximated by
     pi r² N(d; 0, C + r²/4 I), where C is the covariance of the centre, narrowed by `ACROSS`: the disc is replaced by a
-    Gaussian with the same area and second moments. Up to 2 in the centre of a disc, it rises towards a person everywhere.
+    Gaussian with the same area and second moments. Up to 2 in the centre, it rises towards a person everywhere.
 
     Tracks (TrackedObject) that do not move are expected to stay. The highest probability in the disc with the radius
     `robot_radius_m` around the origin counts as that at the robot. Returns an array (n, n), int8, of 0 to `HIGHEST`.

@@ -94,7 +94,7 @@ class TargetSelector(object):
         if self.target is None or self.has_given_up:
             return None
         lost_ns = stamp_ns - self._seen[self.target.id].stamp_ns if self._seen else 0
-        if not -JUMP_NS <= lost_ns <= params.recover_within * NS:  # also if no tracks have arrived, or the clock went back
+        if not -JUMP_NS <= lost_ns <= params.recover_within * NS:  # also without tracks, or if the clock went back
             self.has_given_up = True
             return None
         self._update(tracks, stamp_ns, params.recover_within)

@@ -14,8 +14,8 @@ from ros_3d_bb.planning.planner_view import covariances_after, position_after
 
 TIME_STEP_S, PATH_STEP_M = 0.05, 0.05
 STANDING_S = 2.0  # the usual time of the predictions
-# At this speed, 17 kg (a Jackal) touch a shin with twice the permanent force that it stands, as ISO/TS 15066 permits for
-# transient contacts: 2 * 130 N / sqrt(60 kN/m * 14 kg), A.3.
+# At this speed, 17 kg (a Jackal) touch a shin with twice the quasi-static limit of its force, as ISO/TS 15066 permits
+# for transient contacts: 2 * 130 N / sqrt(60 kN/m * 14 kg), A.3.
 LEAVING_MPS = 0.3
 # Chosen: there is room for a person behind an obstacle whose edge is so much nearer than what is seen beside it, and
 # which is at least so wide. Legs are narrower.
