@@ -23,7 +23,7 @@ DARKEST = 8.0  # added to 8-bit colours: those of dark pixels are mostly noise
 
 def appearance_of(box: Box3D, color: np.ndarray, depth: DepthImage, camera: Camera) -> Optional[Tuple[float, ...]]:
     """The appearance of the person in a Box3D, given an RGB image (height, width, 3) and the DepthImage of the same
-    pixels; None if both parts are unknown, and in grey images, as of an infrared camera: to them, all clothes are alike.
+    pixels; None if both parts are unknown, and in grey images, as of an infrared camera: all clothes are alike there.
     """
     rows, columns = grid_in(box.rect_px, depth.shape)
     _left, is_head_cut, _right, _bottom = box.truncated_edges
