@@ -89,7 +89,7 @@ def test_a_scene_contains_the_images_of_the_simulator(scene):
 
 @pytest.mark.parametrize('text,option,named', [
     (json.dumps(SCENE), ('--rate', '0'), 'rate is 0'), (json.dumps(SCENE), ('--rate', 'nan'), 'rate is nan'),
-    (json.dumps(SCENE), ('--seed', '-1'), 'seed is -1'), ('people:\n- {strat: [1, 2]}', (), 'mean start')])
+    (json.dumps(SCENE), ('--seed', '-1'), 'seed is -1'), ('people:\n- {strat: [1, 2]}', (), '[1].start?')])
 def test_an_invalid_scenario_leaves_no_bag_and_the_fault_is_named(tmp_path, text, option, named):
     (tmp_path / 'scene.yaml').write_text(text)
     status, output = run(scenario_to_bag, tmp_path / 'scene.yaml', tmp_path / 'out.bag', *option)
