@@ -233,7 +233,7 @@ class Follower(object):
         if self.person is not None and all(track.id != self.person.id for track in tracks):
             tracks = list(tracks) + [self.person]
         limit = highest_safe_speed(tracks, age_s, robot_from_tracks, (max(wanted[0], SLOWEST_MPS), 0.0, wanted[1]),
-                                   self._safety, pose_age_s)
+                                   self._safety, pose_age_s, leaves=False)  # it does not look for a way past people
         params, (linear, angular) = self._params, self._velocity
         change = params.angular_acceleration * step_s
         self._velocity = (

@@ -50,7 +50,7 @@ class CornerParams(NamedTuple):
         limits=(0.05, 10.0), live=(0.1, 1))
 
 
-def highest_safe_speed(tracks, age_s, robot_from_tracks, velocity, params, pose_age_s=0.0):
+def highest_safe_speed(tracks, age_s, robot_from_tracks, velocity, params, pose_age_s=0.0, leaves=True):
     """Highest speed, m/s, from which the robot stops before the ellipses of all people in its way.
 
     The separation distance of ISO/TS 15066 (5.5.4), with the distance in which the robot stops, v T + v²/2a, on one
@@ -58,8 +58,8 @@ def highest_safe_speed(tracks, age_s, robot_from_tracks, velocity, params, pose_
     time until the robot stands. The ellipse is the predicted position with `position_sigmas` of its covariance, around
     which the body, the robot and `people_clearance` are added.
 
-    A person who will come to the robot does not keep it from leaving at up to `LEAVING_MPS`: if it would be in the
-    ellipse where it stands, within `STANDING_S`, only places count that are nearer to the person, relative to the
+    A person who will come to a robot that `leaves` does not keep it from that at up to `LEAVING_MPS`: if it would be in
+    the ellipse where it stands, within `STANDING_S`, only places count that are nearer to the person, relative to the
     ellipse, or where the robot would touch the body at its expected position.
 
     The stamp of the tracks (TrackedObject) is `age_s` seconds ago; the latest pose of their frame, (4, 4), is that of
@@ -70,7 +70,7 @@ def highest_safe_speed(tracks, age_s, robot_from_tracks, velocity, params, pose_
     for track in sorted(tracks, key=lambda each: np.linalg.norm(each.position_m - robot_m)):  # the nearest limit most
         to_person = functools.partial(_distances_to_person, track, age_s, robot_from_tracks, params)
         safe_mps = _safe_speed(lambda *moved: to_person(*moved)[0], velocity, params, speed_mps, pose_age_s)
-        if safe_mps < LEAVING_MPS:
+        if leaves and safe_mps < LEAVING_MPS:
             standing_s = np.arange(0, STANDING_S, TIME_STEP_S)
             least = to_person(standing_s, np.zeros((1, 2)))[0].min()
             leaving_mps = _safe_speed(functools.partial(_nearer, to_person, least), velocity, params, LEAVING_MPS,
