@@ -1,11 +1,11 @@
 """Records in YAML files: NamedTuples whose fields are numbers, flags, texts, other records, and lists of them."""
-import math
 from typing import Any, Callable, Sequence, Set, Tuple
 
 import yaml
 
 from ros_3d_bb.core.params import nearest_name
 
+MOST = 1e10  # bound of the absolute value of numbers
 EXPECTED = {float: 'a number', int: 'an integer', bool: 'true or false', str: 'text'}  # types of values
 Check = Tuple[Set[str], Callable[[Any], bool], str]  # names of fields, whether a value is valid, what is expected
 
@@ -41,7 +41,7 @@ def _value(kind: Any, content: Any, where: str, checks: Sequence[Check]) -> Any:
     is_flag = isinstance(content, bool)  # which is an int, too
     if kind is float and isinstance(content, int) and not is_flag:
         content = float(content)
-    if not isinstance(content, kind) or is_flag != (kind is bool) or (kind is float and not math.isfinite(content)):
+    if not isinstance(content, kind) or is_flag != (kind is bool) or (kind is not str and not abs(content) < MOST):
         raise ValueError('%s is %r; %s expected' % (where, content, EXPECTED[kind]))
     for names, is_valid, expected in checks:
         if where.rpartition('.')[2] in names and not is_valid(content):
