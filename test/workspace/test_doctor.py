@@ -56,6 +56,19 @@ def test_a_sound_bag_has_no_faults(bag):
     assert 'ok     boxes and depth: 100 % paired by stamp' in lines
 
 
+def without_people(topic, message):
+    if topic == '/yolo_bounding_box':
+        message.data = []
+    return topic, message
+
+
+def test_empty_arrays_are_named(bag, tmp_path):
+    """They are no fault, but tell at which stage people are missing."""
+    for path, is_empty in ((bag, False), (changed(bag, tmp_path, without_people), True)):
+        facts = {finding.subject: finding.fact for finding in examined(path)[0]}
+        assert facts['2D boxes'].endswith('Hz, all empty' if is_empty else 'Hz'), facts
+
+
 def test_a_file_that_is_no_bag_is_reported(tmp_path):
     (tmp_path / 'no.bag').write_text('no bag')
     found, = faults_in(tmp_path / 'no.bag')

@@ -6,8 +6,9 @@ from ros_3d_bb.diagnosis.observations import Finding
 from ros_3d_bb.diagnosis.roles import INFO
 from ros_3d_bb.diagnosis.tf_tree import root_of
 
-UNIT_FIX = ('correct the driver, or set depth_scale to metres per unit in config/bbox3d.yaml, config/tracker.yaml and, '
-            'for detector:=depth, config/depth.yaml: 1.0 for metres, 0.001 for millimetres')
+FILES_OF_SCALE = 'a file passed as bbox3d_params:=, tracker_params:= and, for detector:=depth, detector_params:='
+UNIT_FIX = ('correct the driver, or set depth_scale to metres per unit (1.0 for metres, 0.001 for millimetres) in '
+            + FILES_OF_SCALE)
 NO_DEPTH_FIX = ('pass the topic of depth images in 16UC1 or 32FC1 (camera_depth:=TOPIC); compressed ones end in '
                 '/compressedDepth: JPEG changes depth')
 

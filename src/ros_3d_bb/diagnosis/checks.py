@@ -5,7 +5,7 @@ their unit is not checked.
 """
 from ros_3d_bb.camera.alignment import target_frame_fault
 from ros_3d_bb.conversions.perception_msgs import LATEST_NS
-from ros_3d_bb.diagnosis.camera_checks import check_alignment, check_camera, check_encodings
+from ros_3d_bb.diagnosis.camera_checks import FILES_OF_SCALE, check_alignment, check_camera, check_encodings
 from ros_3d_bb.diagnosis.observations import KEPT, Finding
 from ros_3d_bb.diagnosis.roles import BOXES2D, BOXES3D, COLOR, DEPTH, IMAGES, INFO, TRACKS, needed_images
 from ros_3d_bb.diagnosis.tf_tree import (clock_fault_of_tf, frames_in, is_fixed_root, is_height_of, optical_frame_fix,
@@ -184,8 +184,7 @@ def _mount(seen):
     if factor is not None:
         yield Finding('depth unit', '', '%d people are found in %d images, and %d if depth is multiplied by %g'
                       % (mount.people[0], mount.images, mount.factors[factor][0], factor),
-                      'set depth_scale: %g in config/bbox3d.yaml, config/tracker.yaml and, for detector:=depth, '
-                      'config/depth.yaml' % (factor * seen.depth.converted.scale_m))
+                      'set depth_scale: %g in %s' % (factor * seen.depth.converted.scale_m, FILES_OF_SCALE))
     if tf is None or not tf.fault:
         return
     if mount.turns:
@@ -218,8 +217,8 @@ def _pairs_of_boxes(seen):
     if late_s > seen.cache_length_s:
         yield Finding(subject, '', 'the 2D boxes arrive %.1f s after their depth image, which is cached for %g s'
                       % (late_s, seen.cache_length_s),
-                      'use a faster detector (smaller network, device:=cuda), or a larger cache_length '
-                      '(config/bbox3d.yaml)')
+                      'use a faster detector (smaller network, device:=cuda), or a larger cache_length in the '
+                      'file of bbox3d_params:=')
     elif share is not None and share < MIN_PAIRED:
         yield Finding(subject, '', 'only %.0f %% of the 2D boxes have a depth image with their stamp' % (100 * share),
                       'the detector must copy the stamp of its image into the label, or write no label at all; compare '
@@ -236,7 +235,8 @@ def _results(seen):
     for key in (BOXES2D, BOXES3D, TRACKS):
         stream = seen.streams[key]
         if stream.count:
-            yield Finding(stream.role.title, '%s, %.1f Hz' % (stream.topic, stream.rate_hz))
+            empty = ', all empty' if stream.is_empty else ''
+            yield Finding(stream.role.title, '%s, %.1f Hz%s' % (stream.topic, stream.rate_hz, empty))
         elif has_inputs[key] and not seen.is_bag:
             yield Finding(stream.role.title, '', *silence_fault(stream, seen.topics, (), seen.seconds))
 

@@ -100,7 +100,7 @@ class Observation(object):
 
     def __init__(self, role, topic):
         self.role, self.topic, self.newest, self.on_message = role, topic, None, lambda: None
-        self._count, self._passed_ns, self.arrival_ns = 0, 0, None
+        self._count, self._passed_ns, self.arrival_ns, self._is_empty = 0, 0, None, True
         self._received_ns, self.lag_s, self._machine_lag_s = collections.deque(maxlen=KEPT), None, None
         self._senders, self._jumps = Senders(), TimeJumps()
 
@@ -110,6 +110,7 @@ class Observation(object):
         if self.arrival_ns:
             self._passed_ns += max(ros_ns - self.arrival_ns, 0)  # not from the end of a looped bag to its start
         self.arrival_ns, self.newest = ros_ns, message
+        self._is_empty = self._is_empty and _is_empty(message)
         stamp_ns = _stamp_in(message)
         if stamp_ns:
             self._received_ns.append((stamp_ns, ros_ns))
@@ -126,7 +127,7 @@ class Observation(object):
         rate_hz = (self._count - 1) * NS / self._passed_ns if self._passed_ns else 0.0
         stamps_ns = tuple(stamp_ns for stamp_ns, _arrival_ns in list(self._received_ns))
         return Stream(self.role, self.topic, published_kind, publishers, self._count, rate_hz, stamps_ns, self.lag_s,
-                      self._machine_lag_s, self._senders.take())
+                      self._machine_lag_s, self._senders.take(), self._count > 0 and self._is_empty)
 
     def tf_seen(self, transforms, target_frame, source_frame='', arrivals=TfArrivals(), timeout_s=0.0):
         """Look up the pose of the camera in the fixed frame at the stamp of an image. None without images.
@@ -264,6 +265,10 @@ def _stamp_in(message):
         return boxes2d_from_msg(message).stamp_ns
     except ValueError:
         return None
+
+
+def _is_empty(message):
+    return any(len(getattr(message, name)) == 0 for name in ('data', 'boxes', 'objects') if hasattr(message, name))
 
 
 def _newest(message, convert):

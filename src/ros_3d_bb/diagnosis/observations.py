@@ -39,6 +39,7 @@ class Stream(NamedTuple):
     lag_s: Optional[float] = None  # ROS time minus stamp at the arrival of the newest message
     machine_lag_s: Optional[float] = None  # the same by the clock of the machine
     senders: Tuple[str, ...] = ()  # nodes that publish it at once; empty if there is one
+    is_empty: bool = False  # whether no message contains a box or a track
 
 
 class Newest(NamedTuple):
