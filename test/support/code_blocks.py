@@ -4,8 +4,7 @@ import re
 from collections import namedtuple
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-PAGES = ['README.md'] + sorted('doc/' + name for name in os.listdir(os.path.join(ROOT, 'doc'))
-                               if name.endswith('.md'))
+PAGES = ['README.md'] + sorted('doc/' + name for name in os.listdir(os.path.join(ROOT, 'doc')) if name.endswith('.md'))
 
 # Text between two fences; `language` is '' if the opening fence names none.
 Block = namedtuple('Block', 'page line language text')

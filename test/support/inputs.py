@@ -11,8 +11,7 @@ from tf2_msgs.msg import TFMessage
 from ros_3d_bb.camera.camera_model import OPTICAL_ROTATION, Camera, transform_from
 from ros_3d_bb.camera.images import DepthImage
 from ros_3d_bb.conversions.camera_msgs import CameraFrame, messages_of, transform_messages
-from ros_3d_bb.conversions.perception_msgs import (BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg,
-                                                   time_from)
+from ros_3d_bb.conversions.perception_msgs import BOXES3D_TOPIC, BOXES_TOPIC, TRACKS_TOPIC, boxes2d_to_msg, time_from
 from ros_3d_bb.conversions.planner_msgs import points_to_msg
 from ros_3d_bb.detection.yolov5.predictions import Backend
 from ros_3d_bb.msg import BoundingBox3D, BoundingBox3DArray, TrackedObjectArray

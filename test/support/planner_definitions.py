@@ -41,7 +41,6 @@ uint8 CYLINDER_RADIUS=1""",
 std_msgs/Header header
 uint32 id
 uint8 detection_level
-uint8 OBJECT_DETECTED=0
 uint8 OBJECT_TRACKED=1
 bool object_classified
 geometry_msgs/Pose pose
@@ -51,16 +50,12 @@ geometry_msgs/Polygon polygon
 shape_msgs/SolidPrimitive shape
 uint8 classification
 uint8 CLASSIFICATION_UNKNOWN=0
-uint8 CLASSIFICATION_UNKNOWN_SMALL=1
-uint8 CLASSIFICATION_UNKNOWN_MEDIUM=2
-uint8 CLASSIFICATION_UNKNOWN_BIG=3
 uint8 CLASSIFICATION_PEDESTRIAN=4
 uint8 CLASSIFICATION_BIKE=5
 uint8 CLASSIFICATION_CAR=6
 uint8 CLASSIFICATION_TRUCK=7
 uint8 CLASSIFICATION_MOTORCYCLE=8
 uint8 CLASSIFICATION_OTHER_VEHICLE=9
-uint8 CLASSIFICATION_BARRIER=10
 uint8 CLASSIFICATION_SIGN=11
 uint8 classification_certainty
 uint32 classification_age""",

@@ -135,8 +135,7 @@ def test_a_person_who_carries_a_box_is_not_behind_the_axis_or_before_the_box(ahe
     assert front_m[0, 2] < box.center_m[2] < scene.depths_m[0] + 0.1
 
 
-@pytest.mark.parametrize('height_m,adult_m,gap_m', [
-    (0.27, 5.0, 0.5), (1.2, 2.5, 0.3), (1.2, 3.5, 0.8)])
+@pytest.mark.parametrize('height_m,adult_m,gap_m', [(0.27, 5.0, 0.5), (1.2, 2.5, 0.3), (1.2, 3.5, 0.8)])
 def test_a_child_before_an_adult(height_m, adult_m, gap_m):
     scene = Scene(simulator_of([{'start': [adult_m - gap_m, 0.05], 'facing': 3.1, 'height': 1.1},
                                 {'start': [adult_m, 0.0], 'facing': 3.1, 'height': 1.8}], height_m))

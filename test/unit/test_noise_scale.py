@@ -19,8 +19,7 @@ def walk(tracker, sigma_m, covariance_m2=None, seed=0, turns=0.4):
         time_s = number / RATE_HZ
         place_m = np.array([1.2 * time_s - 10, 5 + np.sin(turns * time_s), 0.85])
         measured_m = place_m + sigma_m * random.normal(size=3) * (1, 1, 0)
-        tracks = tracker.update(int(round((1 + time_s) * NS)), [Detection(measured_m, SIZE_M, covariance_m2)],
-                                VIEW)
+        tracks = tracker.update(int(round((1 + time_s) * NS)), [Detection(measured_m, SIZE_M, covariance_m2)], VIEW)
         if number > SECONDS * RATE_HZ / 2:
             error_m = tracks[0].position_m[:2] - place_m[:2]
             inside.append(error_m.dot(np.linalg.solve(tracks[0].covariance[:2, :2], error_m)) < 5.99)

@@ -89,8 +89,7 @@ def test_distortion_models_are_mapped_to_equal_formulas(name, model, kept):
     camera = camera_from_intrinsics(intrinsics)
     assert camera.distortion_model == model and len(camera.distortion) == kept
     for point in ([0.3, -0.2, 1.5], [-0.5, 0.3, 1.0]):
-        np.testing.assert_allclose(camera.project(point), rs.rs2_project_point_to_pixel(intrinsics, point),
-                                   atol=0.01)
+        np.testing.assert_allclose(camera.project(point), rs.rs2_project_point_to_pixel(intrinsics, point), atol=0.01)
 
 
 @pytest.mark.parametrize('name, named', [

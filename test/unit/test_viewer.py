@@ -12,8 +12,7 @@ from ros_3d_bb.visualization.cv_window import character_of
 from ros_3d_bb.visualization.image_overlay import colorize_depth
 from ros_3d_bb.visualization.viewer_layout import compose
 
-BOX = Box3D(np.array([0.5, -0.25, 2.0]), np.array([0.5, 1.75, 0.5]), (100, 40, 200, 160), 0.75,
-            (True,) * 4)
+BOX = Box3D(np.array([0.5, -0.25, 2.0]), np.array([0.5, 1.75, 0.5]), (100, 40, 200, 160), 0.75, (True,) * 4)
 
 
 def view(**changes):

@@ -17,8 +17,7 @@ from support.bags import changed_bag, messages_in, scene_bag
 from support.commands import run
 
 pytestmark = pytest.mark.slow
-PEOPLE = [{'start': [3.4, 0.9], 'moves': [{'to': [3.4, -0.9]}]},
-          {'start': [4.4, -1.0], 'moves': [{'to': [4.4, 1.0]}]}]
+PEOPLE = [{'start': [3.4, 0.9], 'moves': [{'to': [3.4, -0.9]}]}, {'start': [4.4, -1.0], 'moves': [{'to': [4.4, 1.0]}]}]
 SCENES = {'level': {'mount': [0.0, 0.0, 0.2]}, 'tilted': {'mount': [0.0, 0.0, 1.2], 'pitch': 0.35},
           'moving': {'mount': [0.0, 0.0, 0.2], 'pose': [-0.5, 0.2, 0.1], 'moves': [{'to': [0.8, 0.2]}]}}
 FAR_M = 1.0  # a person without a track counts as this far

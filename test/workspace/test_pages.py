@@ -87,8 +87,7 @@ def test_a_node_connects_to_the_topics_and_services_of_its_docstring(name):
             # images are subscribed with any type, see `subscribers.subscribe`
             types = {topic.lstrip('/'): connection.kind._type.replace('*', 'sensor_msgs/Image')
                      for topic, connection in found.items()}
-            assert types == {
-                topic.lstrip('/'): kind for topic, kind in documented(name, section).items()}
+            assert types == {topic.lstrip('/'): kind for topic, kind in documented(name, section).items()}
         assert {service: kind._type for service, kind in connections.services.items()} == documented(name, 'Services')
 
 

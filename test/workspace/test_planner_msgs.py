@@ -12,8 +12,7 @@ from sensor_msgs.msg import PointCloud2
 from ros_3d_bb.camera.camera_model import transform_from, transform_points
 from ros_3d_bb.conversions import planner_msgs
 from ros_3d_bb.conversions.perception_msgs import time_from
-from ros_3d_bb.conversions.planner_msgs import (detections3d_to_msg, objects_to_msg, obstacles_to_msg,
-                                                people_to_msg)
+from ros_3d_bb.conversions.planner_msgs import detections3d_to_msg, objects_to_msg, obstacles_to_msg, people_to_msg
 from ros_3d_bb.core.params import params_from
 from ros_3d_bb.core.time_sync import NS
 from ros_3d_bb.nodes.planner_bridge_node import PlannerBridgeParams

@@ -125,8 +125,7 @@ def fit_image(image: np.ndarray, input_hw: Tuple[int, int], stride: Optional[int
         pad_y, pad_x = pad_y % stride, pad_x % stride
     top, left = (pad_y // 2, pad_x // 2) if padding == 'center' else (0, 0)
     if pad_x or pad_y:
-        image = cv2.copyMakeBorder(image, top, pad_y - top, left, pad_x - left, cv2.BORDER_CONSTANT,
-                                   value=(GREY,) * 3)
+        image = cv2.copyMakeBorder(image, top, pad_y - top, left, pad_x - left, cv2.BORDER_CONSTANT, value=(GREY,) * 3)
     return image, Placement(scale, (left, top))
 
 

@@ -54,8 +54,7 @@ class ViewerParams(NamedTuple):
     panel_width: int = Param(
         320, 'Width of each of the three images in the window; 320 fits a screen of 1024 pixels.', 'pixels',
         limits=(80, 10000))
-    depth_image_range: float = Param(
-        DEPTH_RANGE_M, 'Depth at the far end of the colours.', 'm', limits=(0.1, 10000))
+    depth_image_range: float = Param(DEPTH_RANGE_M, 'Depth at the far end of the colours.', 'm', limits=(0.1, 10000))
     timer_delay: float = Param(5.0, 'Countdown of the timer before its first measurement.', 's')
     timer_count: int = Param(3, 'Number of measurements of the timer.', limits=(1, 1000))
     timer_interval: float = Param(1.0, 'Time between the measurements of the timer.', 's')

@@ -221,8 +221,7 @@ class TrackingStage(object):
 
     def _silent_cameras(self, newest_ns: int) -> List[str]:
         timeout_s = self._params.camera_timeout or float('inf')
-        return [name for name in self.views
-                if newest_ns - self._boxes_ns.get(name, float('-inf')) > timeout_s * NS]
+        return [name for name in self.views if newest_ns - self._boxes_ns.get(name, float('-inf')) > timeout_s * NS]
 
     def _accept(self, stamp_ns: int, now_ns: int, camera_name: str) -> bool:
         """Whether the stamp of boxes is consistent with those of the other cameras. Handles backward jumps in time, as

@@ -24,8 +24,7 @@ LEAST_ROOM_M, LEAST_WIDTH_M = 0.5, 0.35
 
 @parameters('safe speed')
 class SafeSpeedParams(NamedTuple):
-    robot_radius: float = Param(
-        0.35, 'Radius of the robot around the origin of its frame.', 'm', limits=(0.05, 5.0))
+    robot_radius: float = Param(0.35, 'Radius of the robot around the origin of its frame.', 'm', limits=(0.05, 5.0))
     reaction_time: float = Param(
         0.3, 'Time from a command to the beginning of the deceleration, in which the robot keeps its speed.', 's',
         limits=(0.0, 5.0), live=(0, 1))
@@ -36,8 +35,7 @@ class SafeSpeedParams(NamedTuple):
         0.1, 'Distance from people at which the robot stops.', 'm', limits=(0.0, 5.0), live=(0, 1))
     position_sigmas: float = Param(
         2.0, 'Standard deviations of the predicted positions that are kept free.', limits=(0.0, 5.0), live=(0, 3))
-    highest_speed: float = Param(
-        2.0, 'Limit where there are no people.', 'm/s', limits=(0.05, 10.0), live=(0.1, 3))
+    highest_speed: float = Param(2.0, 'Limit where there are no people.', 'm/s', limits=(0.05, 10.0), live=(0.1, 3))
 
 
 @parameters('blind corners')

@@ -58,8 +58,7 @@ class CameraState(NamedTuple):
 
 def recent_others(cameras: Dict[str, CameraState], camera: str, stamp_ns: int) -> Dict[str, CameraState]:
     """The {name: CameraState} of each camera but `camera` that is not ignored in an image with this stamp."""
-    return {name: other for name, other in cameras.items()
-            if name != camera and stamp_ns - other.stamp_ns <= RECENT_NS}
+    return {name: other for name, other in cameras.items() if name != camera and stamp_ns - other.stamp_ns <= RECENT_NS}
 
 
 def mark_missed(missed: Sequence[Track], tracks: Iterable[Track], before: Iterable[Track],

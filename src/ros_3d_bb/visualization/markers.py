@@ -181,8 +181,7 @@ class MarkerWriter(object):
     def _ellipse(self, track):
         if track.id not in self._outlines:
             return None
-        return _Look(Marker.LINE_STRIP, ELLIPSE_SCALE, _color(self._rgb(track), 0.9),
-                     points=self._outlines[track.id])
+        return _Look(Marker.LINE_STRIP, ELLIPSE_SCALE, _color(self._rgb(track), 0.9), points=self._outlines[track.id])
 
     def _rgb(self, track):
         if self._params.marker_color == 'status':

@@ -73,8 +73,7 @@ class GraphObserver(object):
         self._topics.update(published_topics())
         boxes3d, frame_id = self._observed[BOXES3D].newest, self._bbox3d_param('frame_id')
         target_frame = self._target_frame or tracker_param('target_frame')
-        camera_frame = tracker_param('camera_frame') or (
-            boxes3d.header.frame_id if boxes3d is not None else frame_id)
+        camera_frame = tracker_param('camera_frame') or (boxes3d.header.frame_id if boxes3d is not None else frame_id)
         timeout_s = tracker_param('tf_timeout')
         return observations_of(
             self._observed, self._depth_info, self._topics, time.monotonic() - self._began_s, publishers_of,

@@ -110,8 +110,7 @@ def check(mechanism):
         owner = functools.reduce(getattr, path, owner)
         getattr(owner, name)
         return owner, name
-    raise ValueError('mechanism %r: %s.%s has no %s' % (mechanism.name, PACKAGE, mechanism.module,
-                                                        mechanism.attribute))
+    raise ValueError('mechanism %r: %s.%s has no %s' % (mechanism.name, PACKAGE, mechanism.module, mechanism.attribute))
 
 
 @contextlib.contextmanager

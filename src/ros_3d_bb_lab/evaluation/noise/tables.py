@@ -181,8 +181,7 @@ def _axis_of(row, axis, where):
         raise ValueError('%s: "%s measured" is %g and "%s true" is %g; both or none expected'
                          % (where, axis, measured, axis, true))
     if abs(measured - true - error) > ROUNDING_MM:
-        raise ValueError('%s: "%s error" is %g, but measured minus true is %g'
-                         % (where, axis, error, measured - true))
+        raise ValueError('%s: "%s error" is %g, but measured minus true is %g' % (where, axis, error, measured - true))
     return measured, true
 
 

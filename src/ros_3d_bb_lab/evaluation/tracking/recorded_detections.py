@@ -129,8 +129,7 @@ class _People(object):
 def _detection(box, fixed_from_camera, is_logit):
     score = 1 / (1 + np.exp(-PLATT[0] * (box['score'] - PLATT[1]))) if is_logit else box['score']
     place_m = transform_points(fixed_from_camera, np.array([box['x_m'], box['y_m'], box['z_m']]))
-    return Detection(place_m, np.array([box['width_m'], box['width_m'], box['height_m']]),
-                     score=score)
+    return Detection(place_m, np.array([box['width_m'], box['width_m'], box['height_m']]), score=score)
 
 
 def _unscored(rows):

@@ -156,8 +156,7 @@ def _in_view(pedestrians, time_s, pose, camera):
 
 
 def _walks(pedestrians, times_s):
-    there = [person for person in pedestrians
-             if person.start_s <= times_s[-1] and person.end_s + STAYS_S >= times_s[0]]
+    there = [person for person in pedestrians if person.start_s <= times_s[-1] and person.end_s + STAYS_S >= times_s[0]]
     shape = (len(times_s), len(there))
     walks = _Walks(np.full(shape + (2,), np.nan), np.full(shape + (2,), np.nan), np.zeros(shape, bool),
                    np.full(shape + (len(HORIZONS_S), 2), np.nan))

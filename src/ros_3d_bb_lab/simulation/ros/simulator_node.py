@@ -215,8 +215,7 @@ class SimulatorNode(object):
 
 def _scenario(params):
     if not params.scenario:
-        raise ValueError('no scenario given; set ~scenario to the path of a file such as those in '
-                         'config/scenarios')
+        raise ValueError('no scenario given; set ~scenario to the path of a file such as those in config/scenarios')
     try:
         scenario = read_scenario(params.scenario)
     except OSError as error:
