@@ -105,8 +105,8 @@ def test_topics_can_be_remapped_and_a_missing_one_is_named(scene, tmp_path):
 
 def test_without_transforms_the_summary_names_the_cause(scene, tmp_path):
     changed_bag(scene, tmp_path / 'in.bag', lambda topic, *rest: None if topic == '/tf' else (topic,) + rest)
-    printed = run_tool(tmp_path / 'in.bag', tmp_path / 'out.bag', '--detector', 'depth')
-    assert '15  no transform' in printed
+    status, printed = run(main, tmp_path / 'in.bag', tmp_path / 'out.bag', '--detector', 'depth')
+    assert status == 1 and '15  no transform' in printed
     assert printed.splitlines()[-1].startswith('no tracks: no transform from camera_color_optical_frame to map')
     found = messages_in(tmp_path / 'out.bag')
     assert '/ros_3d_bb/tracks' not in found and len(found['/ros_3d_bb/bb_3d']) == 15

@@ -28,7 +28,7 @@ OPTIONS = 'detector', 'weights', 'error_model', 'target_frame', 'cameras', 'dept
 
 
 def main(arguments: Optional[List[str]] = None) -> None:
-    """Run the command. The exit status is 1 if the bag could not be processed."""
+    """Run the command. The exit status is 1 if the bag could not be processed, or has no tracks messages."""
     parser = _parser()
     given = parser.parse_args(arguments)
     try:
@@ -49,7 +49,7 @@ def main(arguments: Optional[List[str]] = None) -> None:
         print('%s; no bag was written' % _reason(given.source, settings, error), file=sys.stderr)
         sys.exit(1)
     print('\n'.join(['%s:' % given.target] + _summary(events, settings)))
-    sys.exit(0)
+    sys.exit(0 if events.counts.get('images tracked') else 1)
 
 
 def _settings_from(given: argparse.Namespace) -> Settings:

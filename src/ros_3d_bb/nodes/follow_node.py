@@ -53,7 +53,7 @@ class FollowNode(object):
     cmd_vel : geometry_msgs/Twist
         Velocity of the robot, 20 times per second while it follows; with ~output cmd_vel.
     move_base_simple/goal : geometry_msgs/PoseStamped
-        Where the robot keeps its distance from the person, every 5 s until it is there; with ~output goal.
+        Where the robot keeps its distance, whenever that moves, and every 5 s until it is there; with ~output goal.
     move_base/cancel : actionlib_msgs/GoalID
         Cancels the goal; with ~output goal.
     ~target : std_msgs/UInt32
