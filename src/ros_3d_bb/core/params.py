@@ -55,8 +55,8 @@ CLASSES_FILE = Param('', 'Absolute path of a table of the classes of objects, in
                      'empty: that table. All nodes need the same table.')
 ROBOT_FRAME = Param('base_link')
 TRACKS_TIMEOUT = Param(
-    0.5, 'Age of the newest tracks, from the stamp of their image, from which on there are none. More than the '
-    'pipeline takes from image to tracks, and a period of the images.', 's', limits=(0.05, 10.0))
+    0.5, 'Tracks older than this, since the stamp of their image, count as missing. More than the pipeline takes from '
+    'image to tracks, and a period of the images.', 's', limits=(0.05, 10.0))
 WAIT_FOR_SUBSCRIBERS = Param(0, 'Start once the colour image has this many subscribers, so that they miss no image.')
 
 

@@ -54,7 +54,7 @@ class Bbox3dParams(NamedTuple):
     assumed_delay: float = Param(
         0.05, 'Processing time of the detector, used where its boxes have no stamp.', 's', live=(0, 1))
     depth_image_range: float = Param(
-        6.0, 'Depth that is black in the grey image on ros_3d_bb/depth.', 'm', limits=(0.1, 10000), live=(1, 20))
+        6.0, 'Depth that is drawn black in the grey image on ros_3d_bb/depth.', 'm', limits=(0.1, 10000), live=(1, 20))
 
 
 class EstimationStage(object):

@@ -52,8 +52,8 @@ class DepthPeopleParams(NamedTuple):
         1.1, 'Largest angle by which the camera looks down on a fitted floor; 63 degrees.', 'rad',
         limits=(0.1, 1.4), live=(0.1, 1.4))
     min_score: float = Param(
-        0.7, 'Smallest score, 0 to 1, of shape and HOG together. Lower values detect more people and more that is '
-        'none.', live=(0, 1))
+        0.7, 'Smallest score, 0 to 1, of shape and HOG together. Lower values detect more people, and more '
+        'false ones.', live=(0, 1))
 
 
 class Grid(NamedTuple):
