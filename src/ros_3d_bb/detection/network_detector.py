@@ -34,7 +34,7 @@ class DetectionParams(NamedTuple):
     image_size: int = Param(
         0, "Longer side of the network's input, rounded up to its stride (32, P6 models 64). 0: the node chooses "
         'the largest of 320, 384, 448, 512, 576 and 640 that keeps up with the images, but none that is too small for '
-        'detection_range; bags and benchmarks use 640. Exports with a fixed size ignore it.', 'pixels',
+        'detection_range; bags use 640. Exports with a fixed size ignore it.', 'pixels',
         limits=(0, MAX_INPUT_PX), live=(0, 1280))
 
 
