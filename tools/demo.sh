@@ -12,7 +12,7 @@ demo() {
         rate=${argument#rate:=}
         [[ $rate =~ ^[0-9]+(\.[0-9]*)?$ ]] || fail "demo: rate is '$rate'; a number expected" ;;
       -h|--help) help; exit ;;
-      -*|*:=*) fail "demo: unknown option '$argument'; weights:=FILE, rate:=FACTOR or a scenario expected" ;;
+      -*|*:=*) fail "demo: unknown option '$argument'; weights:=FILE, rate:=HZ or a scenario expected" ;;
       *) scenario=$argument ;;
     esac
   done
