@@ -28,7 +28,7 @@ OPTIONS = 'detector', 'weights', 'error_model', 'target_frame', 'cameras', 'dept
 
 
 def main(arguments: Optional[List[str]] = None) -> None:
-    """Run the command. The exit status is 1 if the bag could not be processed, or has no tracks messages."""
+    """Run the command. The exit status is 1 if the bag could not be processed, or no image was tracked."""
     parser = _parser()
     given = parser.parse_args(arguments)
     try:

@@ -127,7 +127,7 @@ class Observation(object):
         rate_hz = (self._count - 1) * NS / self._passed_ns if self._passed_ns else 0.0
         stamps_ns = tuple(stamp_ns for stamp_ns, _arrival_ns in list(self._received_ns))
         return Stream(self.role, self.topic, published_kind, publishers, self._count, rate_hz, stamps_ns, self.lag_s,
-                      self._machine_lag_s, self._senders.take(), self._count > 0 and self._is_empty)
+                      self._machine_lag_s, self._senders.take(), self._is_empty)
 
     def tf_seen(self, transforms, target_frame, source_frame='', arrivals=TfArrivals(), timeout_s=0.0):
         """Look up the pose of the camera in the fixed frame at the stamp of an image. None without images.

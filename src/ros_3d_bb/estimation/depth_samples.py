@@ -15,8 +15,9 @@ from ros_3d_bb.camera.images import FARTHEST_M, DepthImage
 from ros_3d_bb.estimation.box3d import ImageGeometry, Rect
 
 # "Views" is ./run bench ablation estimation --benchmarks views. Without a mechanism, more people are over 0.3 m from
-# their boxes there; with all mechanisms, 5 of 294. Largest numbers of rows and columns; on average, two thirds of them
-# are sampled. Measured: positions are as accurate as with 2000 to 8000 samples (./run bench accuracy).
+# their boxes there; with all mechanisms, 5 of 294.
+# Largest numbers of rows and columns; on average, two thirds of them are sampled. Measured: positions are as accurate
+# as with 2000 to 8000 samples (./run bench accuracy).
 GRID_ROWS, GRID_COLUMNS = 48, 32
 # Weights of the rows: something may stand before the legs. Views: 6 more with equal weights.
 UPPER_SHARE, LOWER_WEIGHT = 0.5, 0.2
