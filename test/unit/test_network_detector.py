@@ -68,6 +68,14 @@ def test_predictions_are_filtered_by_class_and_confidence():
     assert len(selected(rows[:0], 0.25, [0]).boxes) == 0
 
 
+@pytest.mark.parametrize('names, found', [(['person', 'people'], [0]), (['Pedestrian', 'people'], [0, 1]),
+                                          (['cat', 'human'], [1])])
+def test_networks_of_data_sets_with_other_names_of_people_detect_them_by_default(names, found):
+    runtime = FixedRuntime([(50, 50, 20, 20, 0.9, 0.9, 0), (200, 50, 20, 20, 0.9, 0, 0.9)])
+    runtime.names = names
+    assert NetworkDetector(runtime).detect(np.zeros((480, 640, 3), np.uint8)).classes.tolist() == found
+
+
 def test_without_a_node_the_input_is_the_largest_on_each_machine():
     """Bags and benchmarks are reproducible: only detector_node adapts the size."""
     runtime = FixedRuntime()

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from ros_3d_bb.core.detection_pace import SIZES
+from ros_3d_bb.core.object_classes import ObjectClasses
 from ros_3d_bb.core.params import LARGEST, Param, parameters
 from ros_3d_bb.detection.boxes import Detections, non_maximum_suppression
 
@@ -67,7 +68,7 @@ class NetworkDetector(object):
             raise ValueError('classes is empty; at least one class expected, such as person')
         self._network, self._params = network, params
         self.names, self.description = network.names, network.description  # class names by number; text for logs
-        self._classes = [class_number(entry, network.names) for entry in params.classes]
+        self._classes = [number for entry in params.classes for number in class_numbers(entry, network.names)]
         size = int(np.ceil((params.image_size or max(SIZES)) / float(network.stride))) * network.stride
         self._input_hw = network.input_hw or (size, size)
         self._stride = network.stride if network.input_hw is None else None
@@ -95,12 +96,19 @@ class NetworkDetector(object):
         return detections._replace(boxes=placement.undo(detections.boxes, image.shape[:2]))
 
 
-def class_number(entry: Any, names: List[str]) -> int:
-    """Number of a class that is given by name or number. Raises ValueError if the model does not have it."""
+def class_numbers(entry: Any, names: List[str]) -> List[int]:
+    """Numbers of a class that is given by name or number; if no name is equal, those of other names of people.
+
+    Raises ValueError if the model does not have it.
+    """
     if entry in names:
-        return names.index(entry)
+        return [names.index(entry)]
     if str(entry).isdigit() and int(entry) < len(names):
-        return int(entry)
+        return [int(entry)]
+    standard_name = ObjectClasses().standard_name
+    numbers = [number for number, name in enumerate(names) if standard_name(name) == standard_name(str(entry))]
+    if numbers:
+        return numbers
     if names == [str(number) for number in range(len(names))]:
         raise ValueError('class %r is unknown: the model has no names of its %d classes; list them in a '
                          'YAML file beside an ONNX file, see doc/onnx.md' % (entry, len(names)))

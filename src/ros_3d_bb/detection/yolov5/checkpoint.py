@@ -15,7 +15,7 @@ import numpy as np
 from ros_3d_bb.core.error_text import cause
 from ros_3d_bb.detection.weights import MAX_CLASSES, MAX_NAME, WeightsError, class_names
 
-EXPECTED = 'expected the checkpoint (.pt) of an official YOLOv5 detection model, release 5.0 to 7.0'
+EXPECTED = 'expected the checkpoint (.pt) of a YOLOv5 detection model, release 5.0 to 7.0'
 # Modules whose classes become inert stand-ins: the model itself, and leftovers of training in the file.
 INERT_MODULES = ('models', 'utils', 'torch.nn', 'numpy', '_codecs', 'pathlib', 'datetime')
 # A tensor may repeat its numbers by strides of 0, as YOLOv5's cached grids do, up to this size.
