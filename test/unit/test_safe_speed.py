@@ -2,12 +2,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from ros_3d_bb.estimation.error_model import UNCALIBRATED_SIGMA_M
 from ros_3d_bb.planning.planner_view import position_after
 from ros_3d_bb.planning.safe_speed import (LEAST_WIDTH_M, CornerParams, SafeSpeedParams, blind_corners,
                                            highest_safe_speed, limited_velocity, speed_before_corners)
+from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb_lab.simulation.laser import BEAMS, FIELD_OF_VIEW, RANGE_M, scan_ranges
 from ros_3d_bb_lab.simulation.scenario import scenario_from
-from support.people import mounted
+from support.people import at, mounted, play
 from support.tracks import track_at
 
 PARAMS = SafeSpeedParams(position_sigmas=0.0)
@@ -68,6 +70,13 @@ def test_a_robot_at_a_person_may_only_leave():
     near = track_at([0.5, 0.1, 0.9], [0, 0, 0], moving=False)
     assert speed_among(near) == 0.0
     assert speed_among(near, velocity=(-0.5, 0.0, 0.0)) == 2.0
+
+
+@pytest.mark.parametrize('ahead_m, limit_mps', [(3.0, 1.4), (2.0, 0.9), (1.0, 0.3), (0.7, 0.0), (0.65, 0.0)])
+def test_the_limits_before_a_standing_person_are_those_of_the_page(ahead_m, limit_mps):
+    """doc/planners.md. Nearer than the clearance, the robot may not approach, however uncertain the position is."""
+    person, = play(Tracker(), 2, lambda _time_s: [at(ahead_m, 0.0, sigma=UNCALIBRATED_SIGMA_M)])[-1]
+    assert speed_among(person, params=SafeSpeedParams()) == pytest.approx(limit_mps, abs=0.05)
 
 
 @pytest.mark.parametrize('y, turn, least, most', [(0.5, -0.3, 0.3, 0.3), (0.0, 0.0, 0.0, 0.2)])

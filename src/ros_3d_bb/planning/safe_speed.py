@@ -58,7 +58,7 @@ def highest_safe_speed(tracks, age_s, robot_from_tracks, velocity, params, pose_
 
     A person who will come to a robot that `leaves` does not keep it from that at up to `LEAVING_MPS`: if it would be in
     the ellipse where it stands, within `STANDING_S`, only places count that are nearer to the person, relative to the
-    ellipse, or where the robot would touch the body at its expected position.
+    ellipse, or nearer to the body at its expected position, if within `people_clearance`.
 
     The stamp of the tracks (TrackedObject) is `age_s` seconds ago; the latest pose of their frame, (4, 4), is that of
     `pose_age_s` seconds ago, and the robot has moved on since. Of the velocity of the robot, along x, along y and
@@ -70,9 +70,9 @@ def highest_safe_speed(tracks, age_s, robot_from_tracks, velocity, params, pose_
         safe_mps = _safe_speed(lambda *moved: to_person(*moved)[0], velocity, params, speed_mps, pose_age_s)
         if leaves and safe_mps < LEAVING_MPS:
             standing_s = np.arange(0, STANDING_S, TIME_STEP_S)
-            least = to_person(standing_s, np.zeros((1, 2)))[0].min()
-            leaving_mps = _safe_speed(functools.partial(_nearer, to_person, least), velocity, params, LEAVING_MPS,
-                                      pose_age_s)
+            least, gap_m = (distances.min() for distances in to_person(standing_s, np.zeros((1, 2))))
+            nearer = functools.partial(_nearer, to_person, least, min(gap_m, params.people_clearance))
+            leaving_mps = _safe_speed(nearer, velocity, params, LEAVING_MPS, pose_age_s)
             safe_mps = max(safe_mps, min(leaving_mps, LEAVING_MPS))
         speed_mps = min(speed_mps, safe_mps)
     return speed_mps
@@ -179,15 +179,16 @@ def _path(velocity, lengths_m):
     return lengths_m[:, np.newaxis] * along.dot([[cos, sin], [-sin, cos]])
 
 
-def _nearer(to_person, least, *moved):
-    """Distances (n, m) that are at most 1 in the ellipse where they are at most `least`, and at the body."""
-    in_ellipse, to_body = to_person(*moved)
-    return np.minimum(in_ellipse / np.clip(least, 1e-9, 1), to_body)
+def _nearer(to_person, least, gap_m, *moved):
+    """Distances (n, m) that are at most 1 in the ellipse where they are at most `least`, and up to `gap_m` before the
+    body, or where the robot would touch it."""
+    in_ellipse, gaps_m = to_person(*moved)
+    return np.minimum(in_ellipse / np.clip(least, 1e-9, 1), 1 + gaps_m - max(gap_m, 0))
 
 
 def _distances_to_person(track, age_s, robot_from_tracks, params, ahead_s, places_m):
-    """Distances (n, m) of places (m, 2) from the centre of a person at times (n,), relative to the ellipse, and to the
-    sum of the radii of robot and body."""
+    """Distances (n, m) of places (m, 2) from the centre of a person at times (n,), relative to the ellipse, and gaps
+    (n, m) between robot and body, m."""
     rotation, robot_m = robot_from_tracks[:2, :2], np.linalg.inv(robot_from_tracks)[:2, 3]
     ahead_s = age_s + ahead_s
     centers_m = (position_after(track, ahead_s)[:, :2] - robot_m).dot(rotation.T)  # also where the robot is tilted
@@ -197,7 +198,7 @@ def _distances_to_person(track, age_s, robot_from_tracks, params, ahead_s, place
     semi_axes_m = touching_m + params.people_clearance + params.position_sigmas * np.sqrt(np.maximum(variances_m2, 0))
     offsets_m = np.matmul(places_m - centers_m[:, np.newaxis], axes)
     return (np.linalg.norm(offsets_m / semi_axes_m[:, np.newaxis], axis=2),
-            np.linalg.norm(offsets_m, axis=2) / touching_m)
+            np.linalg.norm(offsets_m, axis=2) - touching_m)
 
 
 def _distances_to_corner(corner_m, age_s, params, people_mps, ahead_s, places_m):
