@@ -113,6 +113,7 @@ def compare(session, estimator, model=None):
             'calibration': CALIBRATIONS[model is not None],
             'thesis_calibration': 'none' if thesis.covariances is None else CALIBRATIONS[0],
             'ours': scores_of(ours, truth_m, truncated),
+            'uncorrected': scores_of(Estimates(ours.raw_m, ours.raw_m, None), truth_m, truncated),
             'thesis': scores_of(thesis, truth_m, truncated),
             'recorded': None if recorded is None else scores_of(recorded, truth_m, truncated),
             'per_frame': [dict([('id', frame.id), *zip(names, map(_numbers, values))])
@@ -157,7 +158,7 @@ def run(arguments):
         write_error_model(arguments.fit, fit_error_model(
             ours.raw_m[seen], truth_of(session)[seen], estimator=arguments.estimator))
     print(line_of(**{key: value for key, value in result.items() if isinstance(value, (int, str))}))
-    estimators = {name: result[name] for name in ('ours', 'thesis', 'recorded') if result[name] is not None}
+    estimators = {name: result[name] for name in ('ours', 'uncorrected', 'thesis', 'recorded') if result[name] is not None}
     print('\n'.join(table_of(transposed(estimators))))
     return result
 
