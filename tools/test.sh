@@ -28,7 +28,7 @@ run_all_tests() {
   say "running all tests (data: ${ROS_3D_BB_DATA:-made by the tests})"
   rm -rf "$workspace/build/test_results"
   build_planners &  # the tests that need them wait
-  catkin_make --directory "$workspace" run_tests -j3
+  catkin_make --directory "$workspace" run_tests -j4
   say "totals"
   local totals status=0
   totals=$(catkin_test_results --all "$workspace/build/test_results") || status=$?

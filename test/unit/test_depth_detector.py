@@ -91,6 +91,7 @@ def test_the_box_of_a_person_with_hidden_legs_extends_to_the_floor(number):
     assert boxes[overlaps.argmax(), 3] == pytest.approx(simulator.camera.project(feet_m[None])[0, 1], abs=3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('furniture', [
     [(2.8, -0.5, 0.6, 0.4, 1.8), (4.3, 1.2, 0.9, 0.1, 2.0)], [(2.8, -0.5, 0.3, 0.4, 1.6), (4.3, 1.2, 0.4, 0.4, 2.8)],
     [(2.8, -0.5, 0.5, 0.5, 0.9), (4.3, 1.2, 2.4, 0.4, 2.1)], [(2.5, 0.0, 1.6, 0.8, 0.75)]],

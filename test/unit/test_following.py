@@ -163,6 +163,7 @@ class Drive(object):
                 and np.abs(changes[:, 1]).max() <= PARAMS.angular_acceleration + 1e-6)
 
 
+@pytest.mark.slow
 def test_the_robot_follows_around_a_corner():
     drive = Drive(lambda seconds: (2.5 + 0.7 * min(seconds, 8), 0.7 * max(seconds - 8, 0))).run(25)
     assert drive.limits_are_kept() and drive.pose[2] == pytest.approx(np.pi / 2, abs=0.1)
@@ -176,6 +177,7 @@ def test_the_robot_turns_to_a_person_who_comes_near_and_does_not_reverse():
     assert max(velocity[0] for velocity in drive.velocities[80:]) < 0.1
 
 
+@pytest.mark.slow
 def test_the_robot_waits_for_a_person_who_crosses():
     crossing = Drive(lambda seconds: (4.0 + 0.7 * seconds, 0.0),
                      lambda seconds: [person(2, 3.5, 2.5 - 0.6 * seconds, vy=-0.6)]).run(12)

@@ -22,7 +22,7 @@ REAL_WEIGHTS = pytest.mark.needs(*['torch'] * bool(DATA))
 THESIS_SCENES = scenario_paths('thesis_*')
 SCENES = [path for path in scenario_paths('*') if scene_name(path) != 'follow']  # which takes ten minutes
 # Every n-th of 15 images per second, as on a small computer. In the other scenes, only detections are scored.
-EVERY, OTHERS_EVERY = 3, 40
+EVERY, OTHERS_EVERY = 5, 40
 APPROACH_EVERY = 5  # of 30
 
 

@@ -124,6 +124,7 @@ def test_the_robot_stops_at_furniture_and_says_so_once():
     assert [collision.object for collision in world.collisions] == ['furniture 1'] * 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('moves, start', [((Move(to=(-2.0, 0.0), speed=1.2),), (6.0, .1)), ((), (3.0, .1))])
 def test_people_give_way_to_the_robot(moves, start):
     person = Person(start, moves=moves)

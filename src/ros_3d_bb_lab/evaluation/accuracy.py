@@ -158,7 +158,8 @@ def run(arguments):
         write_error_model(arguments.fit, fit_error_model(
             ours.raw_m[seen], truth_of(session)[seen], estimator=arguments.estimator))
     print(line_of(**{key: value for key, value in result.items() if isinstance(value, (int, str))}))
-    estimators = {name: result[name] for name in ('ours', 'uncorrected', 'thesis', 'recorded') if result[name] is not None}
+    names = 'ours', 'uncorrected', 'thesis', 'recorded'
+    estimators = {name: result[name] for name in names if result[name] is not None}
     print('\n'.join(table_of(transposed(estimators))))
     return result
 

@@ -4,9 +4,7 @@ The times are from the depth image and the 2D boxes to tracks with predictions, 
 computes 3D boxes in the camera's frame; tracking transforms them to the fixed frame, tracks them and predicts. The
 people of a measurement session are placed side by side in one wide depth image. All algorithms process the same image
 and boxes, and take turns in being first, so that other load on the machine and cold caches affect all equally and their
-ratios remain valid.
-
-The algorithms of the thesis are its published code (`--published`) and an optimised reimplementation.
+ratios remain valid. The algorithms of the thesis are reimplemented.
 """
 import functools
 import itertools
@@ -26,7 +24,6 @@ from ros_3d_bb.tracking.occlusion import depths_towards
 from ros_3d_bb.tracking.tracker import Tracker
 from ros_3d_bb.tracking.types import CameraView, Detection, detections_from_boxes
 from ros_3d_bb_lab.evaluation.baselines.original_tracker import OriginalTracker
-from ros_3d_bb_lab.evaluation.baselines.published_code import PublishedCode, load_published
 from ros_3d_bb_lab.evaluation.defaults import data_folder, describe_machine, in_range
 from ros_3d_bb_lab.evaluation.simulated_session import write_simulated_session
 from ros_3d_bb_lab.evaluation.text_table import line_of, table_of
@@ -126,39 +123,24 @@ class Theirs(object):
                 for track in self._tracker.step(stamp_ns, detections)}
 
 
-def algorithms_for(published=None):
-    """{name: function that creates an algorithm for a Crowd}; with a folder of the published code, also of that."""
-    algorithms = {'ours': Ours, 'thesis': Theirs}
-    if published:
-        modules = load_published(published)
-        algorithms['published'] = lambda crowd: PublishedCode(modules, crowd.camera, crowd.depth.scale_m,
-                                                              FIXED_FROM_CAMERA)
-    return algorithms
-
-
-def speed(session, counts=OBJECTS, images=60, published=None):
+def speed(session, counts=OBJECTS, images=60):
     """Measure the CPU time of the algorithms in `images` images for each number of people in `counts`.
 
-    Returns a dictionary: `machine`, `people`, `images`, `objects` (= `counts`); for `ours`, `thesis` and, given the
-    folder of the published code, `published`, the medians of the times in ms by stage; and `ratio` and
-    `ratio_published`, the median ratio of our time to that of the others over both stages. Raises ValueError if no
+    Returns a dictionary: `machine`, `people`, `images`, `objects` (= `counts`); for `ours` and `thesis` the medians of
+    the times in ms by stage; and `ratio`, the median ratio of both times over both stages. Raises ValueError if no
     frame of the session has a box.
     """
-    algorithms = algorithms_for(published)
     people, random = people_of(session), np.random.RandomState(0)
     if not people:
         raise ValueError('no frame of the session has a 2D box')
     random.shuffle(people)  # sessions are ordered by range
-    times_ms = _times_ms([crowd_of(people, count, session) for count in counts], list(algorithms.values()), images,
-                         random)
+    times_ms = _times_ms([crowd_of(people, count, session) for count in counts], (Ours, Theirs), images, random)
     result = {'machine': describe_machine(), 'people': len(people), 'images': images, 'objects': list(counts)}
     both_ms = times_ms[..., STAGES.index('both')]
-    for number, name in enumerate(algorithms):
+    for number, name in enumerate(('ours', 'thesis')):
         medians_ms = np.median(times_ms[:, :, number], axis=0).T.tolist()
         result[name] = dict(zip([stage + '_ms' for stage in STAGES], medians_ms))
-    for number, name in enumerate(('ratio', 'ratio_published')[:len(algorithms) - 1]):
-        result[name] = np.median(both_ms[:, :, 0] / both_ms[:, :, number + 1], axis=0).tolist()
-    return result
+    return dict(result, ratio=np.median(both_ms[:, :, 0] / both_ms[:, :, 1], axis=0).tolist())
 
 
 def _times_ms(crowds, kinds, images, random):
@@ -187,12 +169,11 @@ def _time_ms(algorithm, depth, rects_px, stamp_ns):
 def run(arguments):
     with tempfile.TemporaryDirectory() as folder:
         session = read_session(arguments.data or write_simulated_session(folder, *SIMULATED))
-        result = speed(session, OBJECTS, arguments.images, arguments.published)
+        result = speed(session, OBJECTS, arguments.images)
     result['data'] = arguments.data or 'simulated'
     print(line_of(**{key: result[key] for key in ('machine', 'people', 'data', 'images')}))
-    rows = {'%s/%s' % (name, key): values for name in ('ours', 'thesis', 'published') if name in result
-            for key, values in result[name].items()}
-    rows.update({name: values for name, values in result.items() if name.startswith('ratio')})
+    rows = {'%s/%s' % (name, key): values for name in ('ours', 'thesis') for key, values in result[name].items()}
+    rows['ratio'] = result['ratio']
     print('\n'.join(table_of({name: dict(zip(result['objects'], values)) for name, values in rows.items()})))
     return result
 
@@ -200,7 +181,5 @@ def run(arguments):
 def add_options(parser):
     parser.add_argument('--data', default=data_folder('thesis'), metavar='DIR',
                         help='measurement session (default: $ROS_3D_BB_DATA/data/thesis, or simulated)')
-    parser.add_argument('--published', metavar='DIR',
-                        help='checkout of github.com/Jyrijoul/ros_3d_bb, the published code; also measures it')
     parser.add_argument('--images', type=in_range(int, 1), default=60,
                         help='timed images per number of people (default: 60)')
