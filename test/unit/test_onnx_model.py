@@ -102,7 +102,7 @@ def test_yolox_detects_the_person_in_a_measurement_session(session_folder, tmp_p
 
 
 @pytest.mark.parametrize('names, reason', [('', 'no names of its 3 classes.*YAML'),
-                                           ("['Person', 'Car', 'Dog']", '~classes.*Person, Car, Dog')])
+                                           ("['Bus', 'Car', 'Dog']", '~classes.*Bus, Car, Dog')])
 def test_a_class_that_the_network_does_not_have_is_named(tmp_path, names, reason):
     network = OnnxModel(write_constant_network(tmp_path / 'a.onnx', outputs_of('yolov8', BOXES, SCORES, HW),
                                                metadata={'names': names}), 1)
