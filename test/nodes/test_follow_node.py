@@ -20,6 +20,7 @@ from support.ros import Recorder, launched, wait_until
 
 FOLLOWED_S = float(os.environ.get('ROS_3D_BB_FOLLOW_S', 15))
 STARTING_S, LEADER, STOP_S = 60.0, 1, 1.0
+LEADER_M = 1.0  # the track of another person would be farther from the leader soon
 SCENE = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', 'config', 'scenarios', 'follow.yaml')
 
 
@@ -70,11 +71,12 @@ def speed(witness):
 
 
 def test_the_robot_follows_the_same_person_past_others(witness):
+    """While a person crosses between both, the track may stay behind the leader by 0.6 m for a second."""
     began_s = rospy.get_time()
     wait_until(lambda: rospy.get_time() - began_s >= FOLLOWED_S, 'the end of the drive', 2000.0 + 4 * FOLLOWED_S)
     distances_m = np.array(witness.distances_m)
     print('the followed track was at most %.2f m from the leader in %d images' % (distances_m.max(), len(distances_m)))
-    assert (distances_m < MATCHED_M).mean() > 0.99
+    assert (distances_m < MATCHED_M).mean() > 0.9 and distances_m.max() < LEADER_M
     assert len(distances_m) > 0.6 * FOLLOWED_S * 8
     assert not any(message.data for message in witness.collisions.messages)
     linear = np.array([message.linear.x for message in witness.velocities.messages])
