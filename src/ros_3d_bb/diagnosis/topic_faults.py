@@ -9,7 +9,7 @@ from ros_3d_bb.core.time_sync import NS, half_period_of
 from ros_3d_bb.diagnosis.observations import COMPRESSED_IMAGE, IMAGE
 
 LATE_S, EARLY_S = 5.0, 2.0  # tolerated time of a stamp before and after ROS time
-MIN_RATE_HZ = 4.0  # of images; measured down to 2.5 Hz; lost at 1 Hz or less
+MIN_RATE_HZ = 4.0  # of images; chosen: tracking was measured down to 2.5 Hz, and loses people who walk at 1 Hz or less
 NOT_COLOR = re.compile(r'depth|(^|[/_])(ir|infra\d*)([/_]|$)', re.IGNORECASE)  # by names of drivers
 MIN_PAIRED = 0.5  # required fraction of boxes with a depth image of the same stamp
 NO_CLOCK = ('/use_sim_time is set, but there are no messages on /clock: ROS time stands still',
