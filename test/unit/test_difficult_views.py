@@ -64,7 +64,7 @@ def estimates(simulators, knows_tilt, least_visible=0.3):
     return found, missed
 
 
-@pytest.mark.parametrize('tilt_deg,median_m', [(28, 0.05), (45, 0.07)])
+@pytest.mark.parametrize('tilt_deg,median_m', [(20, 0.05), (28, 0.05), (45, 0.07)])
 def test_positions_of_overlapping_people_below_a_tilted_camera(tilt_deg, median_m):
     scenes = [simulator_of(overlapping_people(4, 1.6, 4.5, np.random.RandomState(seed)), 2.35, tilt_deg, 2.0, 1.0, seed)
               for seed in range(6)]
@@ -112,6 +112,16 @@ def test_a_second_box_of_a_person_is_no_person_on_the_wall(height_m, ahead_m, wi
     second_px = x1 - more_px, y1, x2 + more_px, y1 + int(lower_edge * (y2 - y1))
     found = [box for box in scene.boxes([first_px, second_px]) if isinstance(box, Box3D)]
     assert found and all(abs(box.center_m[2] - scene.depths_m[0]) < 0.3 for box in found)
+
+
+def test_a_second_box_of_a_partly_hidden_person_is_no_person_on_the_wall():
+    scene = Scene(simulator_of([{'start': [3.3, -0.62], 'facing': 3.1, 'height': 1.7},
+                                {'start': [5.15, -0.42], 'facing': 3.1, 'height': 1.8}], 0.9, wall_m=9.0))
+    near_px, (x1, y1, x2, y2) = scene.rects_px
+    assert x1 + 20 < near_px[0] < x2 - 10
+    boxes = scene.boxes(scene.rects_px + [(x1 - 3, y1 + 5, x2 - 5, (y1 + y2) // 2)])
+    assert [box.center_m[2] for box in boxes[:2]] == pytest.approx(scene.depths_m, abs=0.2)
+    assert isinstance(boxes[2], Rejected)
 
 
 @pytest.mark.parametrize('ahead_m,face_m,facing', [(4.2, 0.5, 3.14), (4.2, 0.6, 2.7), (3.0, 0.5, 2.7), (3.0, 0.6, 2.7)])
@@ -175,8 +185,12 @@ def test_a_person_behind_a_table_below_a_tilted_camera_in_a_loose_box(ahead_m, w
         assert scene.error_m(scene.frame.people[0], box) < 0.3
 
 
+CHEST_M = [0.3, 0.292, 0.763]
+
+
 @pytest.mark.parametrize('camera_m,start_m,facing,height_m,chest_at_m,chest_m,behind_m', [
-    (0.9, [4.261, 0.354], 2.1, 1.75, [3.768, 0.155], [0.3, 0.292, 0.763], 1.2),
+    (0.9, [4.261, 0.354], 2.1, 1.75, [3.768, 0.155], CHEST_M, 1.2),
+    (0.9, [4.261, 0.354], 1.4, 1.75, [3.768, 0.155], CHEST_M, 1.2),
     (0.9, [3.259, 0.536], 2.14, 1.2, [2.38, 0.262], [0.3, 0.372, 0.579], 2.5),
     (0.9, [4.394, -0.561], 2.57, 1.9, [3.801, -0.686], [0.3, 0.579, 0.885], 0.7)])
 def test_a_person_who_crouches_behind_a_chest(camera_m, start_m, facing, height_m, chest_at_m, chest_m, behind_m):
@@ -215,8 +229,8 @@ def posed_person(simulator, angles):
     return left_m - scene.frame.people[0].position_m[1], box.size_m[1] - standing_m, up_m - standing_m / 2
 
 
-@pytest.mark.parametrize('facing', [3.14, 2.2, 1.57])
-@pytest.mark.parametrize('ahead_m,height_m,tilt_deg', [(3.0, 0.9, 0), (5.0, 2.35, 28)])
+@pytest.mark.parametrize('facing', [3.14, 2.2, 1.57, 0.0])
+@pytest.mark.parametrize('ahead_m,height_m,tilt_deg', [(4.2, 0.9, 0), (3.0, 0.9, 0), (3.4, 2.35, 28), (5.0, 2.35, 28)])
 def test_arms_and_bending_do_not_move_the_axis_or_change_the_height(ahead_m, height_m, tilt_deg, facing):
     simulator = simulator_of([{'start': [ahead_m, 0.2], 'facing': facing, 'height': 1.7}], height_m, tilt_deg,
                              wall_m=6.0)
