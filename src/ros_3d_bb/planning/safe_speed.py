@@ -71,7 +71,8 @@ def highest_safe_speed(tracks, age_s, robot_from_tracks, velocity, params, pose_
         if leaves and safe_mps < LEAVING_MPS:
             standing_s = np.arange(0, STANDING_S, TIME_STEP_S)
             least, gap_m = (distances.min() for distances in to_person(standing_s, np.zeros((1, 2))))
-            nearer = functools.partial(_nearer, to_person, least, min(gap_m, params.people_clearance))
+            nearer = functools.partial(_nearer, to_person, np.clip(least, 1e-9, 1),
+                                       np.clip(gap_m, 0, params.people_clearance))
             leaving_mps = _safe_speed(nearer, velocity, params, LEAVING_MPS, pose_age_s)
             safe_mps = max(safe_mps, min(leaving_mps, LEAVING_MPS))
         speed_mps = min(speed_mps, safe_mps)
@@ -180,10 +181,10 @@ def _path(velocity, lengths_m):
 
 
 def _nearer(to_person, least, gap_m, *moved):
-    """Distances (n, m) that are at most 1 in the ellipse where they are at most `least`, and up to `gap_m` before the
-    body, or where the robot would touch it."""
+    """Distances (n, m) that are at most 1 where they are at most `least` in the ellipse, and up to `gap_m` before the
+    body."""
     in_ellipse, gaps_m = to_person(*moved)
-    return np.minimum(in_ellipse / np.clip(least, 1e-9, 1), 1 + gaps_m - max(gap_m, 0))
+    return np.minimum(in_ellipse / least, 1 + gaps_m - gap_m)
 
 
 def _distances_to_person(track, age_s, robot_from_tracks, params, ahead_s, places_m):
